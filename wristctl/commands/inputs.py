@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from wristctl.board.messages import AXES
@@ -42,28 +43,19 @@ class EarlierRun:
     content: Content | None = None
 
 
-class Inputs(Mapping[str, Given]):
+class Inputs(dict[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 
-    def __init__(self, by_role: Mapping[str, Given] | None = None) -> None:
-        self._by_role = dict(by_role or {})
+    def __init__(self, by_role: Mapping[str, Given] = MappingProxyType({})) -> None:
+        super().__init__(by_role)
         self._read: dict[tuple[str, Any], Any] = {}
-
-    def __getitem__(self, role: str) -> Given:
-        return self._by_role[role]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._by_role)
-
-    def __len__(self) -> int:
-        return len(self._by_role)
 
     def read(self, role: str, reader: Callable[[Any], Read]) -> Read | None:
         """Content that `reader` makes of this input; None without the input."""
-        if role not in self._by_role:
+        if role not in self:
             return None
         if (role, reader) not in self._read:
-            source = self._by_role[role]
+            source = self[role]
             with source.reading() if isinstance(source, Run) else nullcontext():
                 self._read[role, reader] = reader(source)
         content: Read = self._read[role, reader]
@@ -71,13 +63,13 @@ class Inputs(Mapping[str, Given]):
 
     def runs(self) -> dict[str, Run]:
         """The run directories among them, by role."""
-        runs = {role: earlier if isinstance(earlier, Run) else earlier.run for role, earlier in self._by_role.items()}
+        runs = {role: earlier if isinstance(earlier, Run) else earlier.run for role, earlier in self.items()}
         return {role: run for role, run in runs.items() if run is not None}
 
     def recorded(self) -> list[InputRun]:
         """Inputs as the manifest of a run names them. Raises UserError where one is in memory only."""
         runs = self.runs()
-        for role, earlier in self._by_role.items():
+        for role, earlier in self.items():
             if role not in runs and isinstance(earlier, StudyResult):
                 fix = ("write it too: ", Call(command_of(earlier.kind), arguments=(Argument("out", metavar="DIR"),)))
                 raise UserError("a run directory names what it was made from, and this is in memory only", role, fix)
@@ -145,13 +137,11 @@ def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
             raise UserError(f"a {chosen.kind} result where a {need.kind} run is needed", need.leaf, fix)
         return chosen
     ref = chosen.path if isinstance(chosen, Run) else chosen
-    return _stopped(ref, need, out) if need.unfinished else require(ref, need.kind, out, need.content)
-
-
-def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
+    if not need.unfinished:
+        return require(ref, need.kind, out, need.content)
     run = open_run(ref, out)
-    if run.kind != wanted.kind:
-        raise UserError(f"a {run.kind} run where a {wanted.kind} run is needed", str(run.path), "name another")
+    if run.kind != need.kind:
+        raise UserError(f"a {run.kind} run where a {need.kind} run is needed", str(run.path), "name another")
     if run.state == "running":
         raise UserError("that run is still going on", str(run.path), "wait for it, or stop it first")
     return run

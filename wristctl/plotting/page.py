@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from functools import cache
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -72,31 +71,19 @@ def lineage_picture(tree: Ancestor) -> str:
     width = (max(columns.values()) + 1) * (_WIDTH + _GAP) - _GAP + 4
     height = (max(rows.values()) + 1) * _ROW
     place = {name: (2 + columns[name] * (_WIDTH + _GAP), 6 + rows[name] * _ROW) for name in nodes}
-    parts = [_arrow(place[start], place[end]) for start, end in edges]
-    parts += [_box(node, *place[name], is_root=name == tree.id) for name, node in nodes.items()]
-    return (
-        f'<svg class="lineage" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" '
-        f'aria-label="lineage">{"".join(parts)}</svg>'
-    )
-
-
-def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
-    x, y, to_x, to_y = start[0] + _WIDTH, start[1] + _HEIGHT // 2, end[0], end[1] + _HEIGHT // 2
-    middle = to_x - _GAP // 2
-    line = f"M{x} {y}C{middle} {y} {middle} {to_y} {to_x - 6} {to_y}"
-    return f'<path class="edge" d="{line}"/><path class="head" d="M{to_x} {to_y}l-8 -4v8z"/>'
-
-
-def _box(node: Ancestor, x: int, y: int, is_root: bool) -> str:
-    kind = escape(_WORDS.get(node.kind, node.kind))
-    name = printable(node.id)
-    short = escape(name if len(name) <= 26 else f"{name[:16]} … {name[-6:]}")
-    mark = ' class="own"' * is_root + ' class="odd"' * (not is_root and node.state != "ok")
-    state = "" if node.state == "ok" else f" ({escape(node.state)})"
-    return (
-        f"<g{mark}><title>{escape(name)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
-        f"<text x='{x + 10}' y='{y + 18}'>{kind}{state}</text>"
-        f"<text class='id' x='{x + 10}' y='{y + 34}'>{short}</text></g>"
+    middle = _HEIGHT // 2
+    return render(
+        "lineage.svg",
+        width=width,
+        height=height,
+        wide=_WIDTH,
+        high=_HEIGHT,
+        gap=_GAP,
+        arrows=[(place[a][0] + _WIDTH, place[a][1] + middle, place[b][0], place[b][1] + middle) for a, b in edges],
+        boxes=[
+            (printable(name), _WORDS.get(node.kind, node.kind), node.state, name == tree.id, *place[name])
+            for name, node in nodes.items()
+        ],
     )
 
 
