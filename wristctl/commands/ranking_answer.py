@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from wristctl.commands.printed_table import degrees, joined, two
-from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits
+from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits, labels_of
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.control.table import controller
 from wristctl.tuning.objective import YARDSTICK
@@ -54,7 +54,7 @@ def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
 
     Beside a row that is named alone, as its preset is that of each loop, labels stay whole.
     """
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     if any(map(is_by_loop, labels)):
         return _shortened({label: called(label) for label in labels})
     ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
@@ -178,7 +178,7 @@ def _chosen(alike: Sequence[Ranking]) -> str | None:
     firsts = {ranking.labels[row] for ranking in alike if (row := winner(ranking, alike)) is not None}
 
     def mean(label: str) -> float:
-        return sum(math.log(one.means[one.labels.index(label)].value) for one in alike if label in one.labels)
+        return sum(math.log(one.of_label(label).value) for one in alike if label in one.labels)
 
     return max(sorted(firsts), key=lambda label: (often[label], -mean(label)), default=None)
 
@@ -200,7 +200,7 @@ def _errors(best: Sequence[Ranking], label: str) -> str:
     if len(best) == 1:
         text = with_interval(best[0], best[0].labels.index(label))
         return text.replace(" [", " deg [") if "[" in text else f"{text} deg"
-    means = sorted(ranking.means[ranking.labels.index(label)].value for ranking in best)
+    means = sorted(ranking.of_label(label).value for ranking in best)
     least, most = degrees(means[0], DIGITS), degrees(means[-1], DIGITS)
     return f"{least} deg" if least == most else f"{least} to {most} deg"
 
@@ -210,7 +210,7 @@ def _than_the_next(best: Sequence[Ranking], label: str) -> str:
     if any(len(ranking.standing.groups) < 2 for ranking in best):
         return ""
     nexts = [ranking.standing.groups[1][0] for ranking in best]
-    own = [ranking.means[ranking.labels.index(label)].value for ranking in best]
+    own = [ranking.of_label(label).value for ranking in best]
     ratios = [one.means[row].value / mean for one, row, mean in zip(best, nexts, own, strict=True)]
     place = min(range(len(best)), key=lambda number: ratios[number])
     bound = "more than " if degrees(own[place]).startswith("<") else "at least " * (len(best) > 1)

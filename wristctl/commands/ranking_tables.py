@@ -21,7 +21,7 @@ from wristctl.commands.ranking_answer import (
     with_interval,
 )
 from wristctl.commands.results import Findings
-from wristctl.comparison.controller_ranking import Ranking, undominated
+from wristctl.comparison.controller_ranking import Ranking, labels_of, undominated
 from wristctl.comparison.step_cost import StepTime
 from wristctl.comparison.world_ranking import WorldRanking
 
@@ -52,7 +52,7 @@ def controllers_table(
     then those that tie, as far as there is room. Where that is no short table, and does not fit beside each other in so
     many lines, first intervals go, then steps where there are other motions, then controllers.
     """
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     best = [ranking.labels[row] for ranking in rankings if (row := winner(ranking, rankings)) is not None]
     tied = [label for ranking in rankings for label in first_group(ranking)]
     order = list(dict.fromkeys([*recommended(rankings), *asked, *best, *tied, *labels]))
@@ -103,7 +103,7 @@ def _of_controllers(
 
 def standings_table(rankings: Sequence[Ranking]) -> Table:
     """A controller a line: its rank and RMSE under each condition, or what is wrong with it there."""
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
 
     def cell(ranking: Ranking, label: str) -> str:
         if label not in ranking.labels:

@@ -6,7 +6,7 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -172,6 +172,10 @@ class Ranking:
         """The best row of a controller; None where it has none."""
         return next((row for row in self.standing.order if self.labels[row].split("/")[0] == controller), None)
 
+    def of_label(self, label: str) -> GeometricMean:
+        """Geometric mean of the RMSE [rad] of the row with a label."""
+        return self.means[self.labels.index(label)]
+
     def times_better(self, row: int, reference_row: int) -> GeometricMean:
         """Ratio of a reference row's RMSE to another row's on the same cases."""
         penalised_scores = penalised(self.scores)
@@ -186,6 +190,11 @@ class Ranking:
         stands, mean = self.standing, self.means[row]
         names = {"row": self.labels[row], "group": stands.group(row), "fate": stands.fate(row)}
         return names | {"rmse": mean.value, "rmse_low": mean.low, "rmse_high": mean.high}
+
+
+def labels_of(rankings: Iterable[Ranking]) -> list[str]:
+    """Labels of the rows of all rankings, each once."""
+    return list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
 
 
 def probability_of_less(scores: Array) -> Array:

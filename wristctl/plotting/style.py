@@ -247,8 +247,9 @@ def _letters(width: float) -> float:
     return _SMALLEST if _PAPER.get() is not None and width < _PRINTED else 1.0
 
 
-def colour(controller: str) -> str:
-    """The controller's colour, the same in every figure; one without its own gets a colour by its name."""
+def colour(label: str) -> str:
+    """Colour of a controller, or of "controller/gains", the same everywhere; what has none of its own has one by name."""
+    controller = label.partition("/")[0]
     known = _CONTROLLERS.get(controller)
     return known[0] if known else _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
 

@@ -27,7 +27,7 @@ from wristctl.commands.ranking_answer import (
 from wristctl.commands.ranking_tables import controllers_table, keep_error
 from wristctl.commands.results import Findings
 from wristctl.comparison.combinations import CLASS_MEANINGS, ComparedRow
-from wristctl.comparison.controller_ranking import Ranking
+from wristctl.comparison.controller_ranking import Ranking, labels_of
 from wristctl.comparison.paper import T2, verdict
 from wristctl.comparison.repetition_spread import spread
 from wristctl.comparison.step_cost import StepTime
@@ -93,7 +93,7 @@ def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[st
     """Which preset a controller has under which condition that was typed by its name alone; empty where none was."""
     rig = {condition(one): one.traits.rig for one in rankings}
     usual = [preset for preset, wanted in (("hardware", True), ("default", False)) if wanted in rig.values()]
-    alone = dict.fromkeys(label for one in rankings for label in one.labels if is_by_loop(label))
+    alone = list(filter(is_by_loop, labels_of(rankings)))
     presets = [row.split("/", 1) for row, values in gains.items() if values and "/" in row]
     own = {label: [preset for name, preset in presets if name == label] for label in alone}
     others = [f"{label} {preset}" for label, found in own.items() for preset in found if preset not in usual]
@@ -109,7 +109,7 @@ def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[st
 
 def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
     """Gains of the controllers that are recommended, with units; empty where they have none or are not known."""
-    everyone = {label for ranking in rankings for label in ranking.labels}
+    everyone = labels_of(rankings)
     listed = [
         f"{row} has {gains_words(row.split('/')[0], gains[row])}"
         for label in recommended(rankings)
@@ -149,7 +149,7 @@ def gains_meant(rankings: Sequence[Ranking]) -> str:
 
 def papers(rankings: Sequence[Ranking]) -> str:
     """What becomes of the paper's printed gains, and of P1 and P2 exchanged, condition by condition."""
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     sentences = [
         f"{label}{explained} {_outcomes(rankings, label)}"
         for gains, explained in ((PRINTED, ""), ("exchanged", " (P1, P2)"))

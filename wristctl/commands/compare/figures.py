@@ -281,7 +281,7 @@ def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ra
         sound = {label: stands.fate(row) in ("ranked", "too few to tell") for row, label in enumerate(standing.labels)}
         for row, (error, variation) in points.items():
             style: dict[str, Any] = {
-                "color": colour(row.split("/")[0]),
+                "color": colour(row),
                 "linestyle": "none",
                 "marker": "o" if sound[row] else "x",
             }
