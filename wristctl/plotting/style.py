@@ -248,7 +248,7 @@ def _letters(width: float) -> float:
 
 
 def colour(label: str) -> str:
-    """Colour of a controller, or of "controller/gains", the same everywhere; what has none of its own has one by name."""
+    """Colour of a controller, or of "controller/gains", in every figure; one without its own has one by its name."""
     controller = label.partition("/")[0]
     known = _CONTROLLERS.get(controller)
     return known[0] if known else _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]

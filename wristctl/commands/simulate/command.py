@@ -6,7 +6,6 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -111,7 +110,9 @@ def simulate(session: Session) -> Simulated:
     title = ", ".join(part for part in (label, repeated.fate) if part)
     tables = [metrics_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.drawing():
-        (_draw if planes == 1 else _draw_bends)(session, study, repeated)
+        from wristctl.commands.simulate.figures import draw, draw_bends
+
+        (draw if planes == 1 else draw_bends)(session, study, repeated)
     arrives = repeated.failed.any() or repeated.arrives
     short_of, advice = ("", []) if arrives else _short_of(session, study, repeated, network, beyond)
     words = wrist_identified(session.inputs)
@@ -123,54 +124,6 @@ _HEADLINES = {
     1: ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension"),
     2: ("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse_mm", "peak_tension"),
 }
-
-
-def _draw(session: Session, study: Study, repeated: Repeated) -> None:
-    """Draw a motion in one plane over time, and for later its observer, its sliding surface and the wrist."""
-    from wristctl.commands.simulate.figures import consistency, sliding
-    from wristctl.commands.truth_table import truth_heading
-    from wristctl.control.table import controller, gains_of
-    from wristctl.plotting.loop_figures import one_motion, over_time, spread_of_sizes, tensions
-    from wristctl.plotting.wrist_drawing import stroboscope
-
-    settings, findings, course = study.simulate, session.findings, repeated.first.trajectory
-    world, later = truth_heading(study.wrist, settings.loop), partial(findings.figure, later=True)
-    caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
-    findings.figure("course", one_motion, course, heading=world, caption=caption)
-    if len(repeated.failed) > 1:
-        caption = "Size of the error over time: the repetitions' median with its 95 % interval"
-        findings.figure("error-repetitions", over_time, [course], spread_of_sizes([repeated]), caption=caption)
-    for part, caption in (("angle", "Desired and obtained bending angle over time"), ("error", "Its error over time")):
-        later(part, over_time, [course], part, heading=world, caption=caption)
-    findings.figure("tensions", tensions, course, later=not repeated.marks)
-    if course.load is not None:
-        later("observer", consistency, course, heading=world)
-    law = controller(settings.controller)
-    if law.surface is not None and not repeated.failed.any():
-        gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
-        caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
-        later("sliding", sliding, course, law.surface, gains, caption=caption)
-    later("motion", stroboscope, course, study.wrist, plant=settings.loop.plant.model)
-
-
-def _draw_bends(session: Session, study: Study, repeated: Repeated) -> None:
-    """Draw a motion in two planes: the plane of bends with what the tendons reach, and the wrist in space."""
-    from wristctl.commands.truth_table import truth_heading
-    from wristctl.plotting.bend_figure import bend_motion
-    from wristctl.plotting.spatial_view import motion_in_space
-    from wristctl.simulation.worlds import plant_of
-    from wristctl.wrist.spatial.held_bends import reach_of_bends
-    from wristctl.wrist.tendon_layout import TendonLayout
-
-    wrist, loop, findings, course = study.wrist, study.simulate.loop, session.findings, repeated.first.trajectory
-    world, reach = truth_heading(wrist, loop), reach_of_bends(wrist, TendonLayout.of(wrist))
-    findings.overview.figure = "bends"
-    caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
-    findings.figure("bends", bend_motion, course, reach, world, caption=caption)
-    caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
-    findings.figure(
-        "space", motion_in_space, course, plant_of(wrist, loop.plant), world, loop.plant.model, caption=caption
-    )
 
 
 def _short_of(

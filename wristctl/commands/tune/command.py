@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
@@ -21,7 +20,6 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     why_two_planes,
 )
-from wristctl.commands.kept_studies import asked_for, file_of, gains_content, hw_run_fits, keep_study, rig_of, row_of
 from wristctl.commands.loop_warnings import (
     asked_by,
     refuse_out_of_reach,
@@ -31,7 +29,7 @@ from wristctl.commands.loop_warnings import (
     warn_out_of_reach,
 )
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.loop import Reference
@@ -41,18 +39,13 @@ from wristctl.errors import UserError, under
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.commands.tune.answer import Beside, Motion, Start
+    from wristctl.commands.tune.answer import Beside, Start
     from wristctl.simulation.closed_loop import Size
-    from wristctl.tuning.margin import OwnLoop, Stood
+    from wristctl.tuning.margin import Stood
     from wristctl.tuning.search import Search
-    from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
 _ELSEWHERE = 6
-# Seconds in which the margins of a controller are found.
-_MARGINS = 0.1
-# Share of what a family draws at which one of its motions is tried.
-_WITHIN = 0.75
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -84,6 +77,7 @@ class Tuned(StudyResult):
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
         from wristctl.commands.tune.answer import answer_of
+        from wristctl.commands.tune.searches import motion_of
 
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
@@ -181,7 +175,7 @@ def tune(session: Session) -> Tuned:
 
     from wristctl.commands.truth_table import truth_tables
     from wristctl.commands.tune.answer import beside_feedforward, searches_table, starts_of
-    from wristctl.commands.tune.searches import search_all
+    from wristctl.commands.tune.searches import keep_files, margins, search_all, tried_elsewhere
     from wristctl.control.table import controller
     from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
@@ -208,97 +202,13 @@ def tune(session: Session) -> Tuned:
     title = "Tuned gains, best first; objective in decades beside feedforward"
     tables = [searches_table(searches, errors, lost, len(cases), title)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    elsewhere = _elsewhere(session, study, network, gains)
-    stood = _stood(session, own_loop(study, searched, network), gains)
-    _write_files(session.findings, study, gains)
+    elsewhere = tried_elsewhere(session, study, network, gains)
+    stood = margins(session, own_loop(study, searched, network), gains)
+    keep_files(session.findings, study, gains)
     bending = why_two_planes(study.wrist, asked_of_search(study))
     return Tuned(
         session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, stood, bending, starts
     )
-
-
-def motion_of(study: Study, run: str) -> Motion:
-    """One motion of those that gains were searched on: of a family its loop, and a motion within what is drawn."""
-    from wristctl.commands.tune.answer import Motion
-
-    settings, family = study.tune, study.families.get(study.tune.worlds.family)
-    loops, horizon = judged_loops(study, settings), settings.horizon
-    if family is not None:
-        name, horizon = settings.worlds.family, family.horizon
-        reference = family.motion(0, dict.fromkeys(family.draw, _WITHIN))
-    else:
-        name, reference = settings.scenarios[0].loop, settings.scenarios[0].reference
-        loops = {scenario.loop: loops[scenario.loop] for scenario in settings.scenarios}
-    where = f"the loop {name}" if family is None else f"the loop of the worlds {name}"
-    through = settings.network if settings.network and reference.inverse == "network" else ""
-    network = str(Path(run).parent / through) if through else ""
-    return Motion(name, loops, reference, horizon, where, hw_run_fits(study, loops[name]), network)
-
-
-def _write_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[str, float]]) -> None:
-    """A study file for each controller: its gains, and what they were searched on."""
-    tried = motion_of(study, "")
-    loops = {name: loop.model_dump(mode="json") for name, loop in tried.loops.items()}
-    asked = {"loop": loops[tried.name], "reference": asked_for(tried.reference), "horizon": tried.horizon}
-    trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
-    for name, values in gains.items():
-        title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
-        sections = {"simulate": asked, "compare": {"loops": loops}, "hw_run": trial}
-        keep_study(findings, file_of(name), title, gains_content(study, [row_of(name, values)], **sections))
-
-
-def _stood(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
-    """How much the gains of each controller stand on the loop that they were tuned for, kept as a table."""
-    import numpy as np
-    import pandas as pd
-
-    from wristctl.control.table import controller
-
-    stood = dict[str, "Stood"]()
-    with session.progress("looking for margins", total=len(gains), unit="controllers") as advance:
-        for number, (name, values) in enumerate(gains.items(), start=1):
-            law = controller(name)
-            stood[name] = own.stood(law, np.array(law.values(values)))
-            advance(number)
-    if stood:
-        rows = [{"controller": name, **changes._asdict()} for name, changes in stood.items()]
-        session.findings.table("data/margins.csv", pd.DataFrame(rows), units=dict.fromkeys(rows[0], "1"))
-    return stood
-
-
-def _elsewhere(
-    session: Session, study: Study, network: Inverse | None, gains: Mapping[str, Mapping[str, float]]
-) -> dict[str, dict[str, dict[str, int]]]:
-    """Try gains with the motions of the scenarios on the loops that none of these is on: marks by controller and loop.
-
-    Plain Python is not tried on loops that it cannot keep up with.
-    """
-    import numpy as np
-
-    from wristctl.control.table import controller
-    from wristctl.simulation.closed_loop import Size
-    from wristctl.tuning.objective import marks_of
-    from wristctl.tuning.search import tuning_cases
-
-    settings = study.tune
-    searched = {scenario.loop for scenario in settings.scenarios}
-    others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
-    tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    loops = [settings.loops[name] for name in others]
-    efforts = [loop.plant_segments * Size([loop], settings.horizon).steps for loop in loops]
-    done, whole = 0.0, sum(efforts) * len(gains)
-    with session.progress("trying the gains on other loops", 100, "%", after=_MARGINS * len(gains)) as report:
-        for loop, effort in zip(others, efforts, strict=True):
-            scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
-            elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
-            cases = tuning_cases(elsewhere, network)[0]
-            for name, values in gains.items():
-                law = controller(name)
-                if law.keeps_up(settings.loops[loop].control_period):
-                    tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
-                done += effort
-                report(round(100.0 * done / whole))
-    return tried
 
 
 TUNE = sweepable(
