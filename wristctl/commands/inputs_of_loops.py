@@ -51,6 +51,18 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
     gains_of(law, row.gains, tuned)
 
 
+def check_searched(names: Iterable[str]) -> None:
+    """UserError, naming its place, for a controller that is unknown or has no gains to search."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import check_tunable
+
+    for number, name in enumerate(names):
+        try:
+            check_tunable(controller(name))
+        except UserError as error:
+            raise error.at(f"controllers.{number}") from error
+
+
 def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
     """A comparison without the rows that want a tune run, and the inverse that wants a network, where none is given.
 

@@ -151,7 +151,7 @@ def _boxed(claims: Sequence[Claim]) -> list[Claim]:
 
 def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None = None) -> list[Strip]:
     """Every claim that draws can judge, by those of its rows."""
-    values = {name: drawn.values(name) for name in drawn.settings[0].values}
+    values = {name: np.array(drawn.values(name), object) for name in drawn.settings[0].values}
     found = []
     for claim in _boxed(claims):
         if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
@@ -160,14 +160,12 @@ def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None
         sound = _converged(claim, drawn, mirrored)
         verdicts = [verdict if counts else None for verdict, counts in zip(judged, sound, strict=True)]
         yes = np.array([verdict == "reproduced" for verdict in judged])[sound]
-        counted = {
-            name: [value for value, counts in zip(column, sound, strict=True) if counts]
-            for name, column in values.items()
-        }
-        leaves = deciding(yes, counted) if sound.any() else []
-        first = counted[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
-        cut = split(yes, first) if first and not isinstance(first[0], str) else None
-        description = _worded(leaves[0].name, yes, first, cut) if first else ""
+        counted = {name: column[sound].tolist() for name, column in values.items()}
+        leaves, cut, description = deciding(yes, counted) if sound.any() else [], None, ""
+        if leaves and leaves[0].share >= _LEAST:
+            first = counted[leaves[0].name]
+            cut = None if isinstance(first[0], str) else split(yes, first)
+            description = _worded(leaves[0].name, yes, first, cut)
         found.append(Strip(claim, ratios, verdicts, leaves, cut, description))
     return found
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import identified, why_two_planes
+from wristctl.commands.inputs_of_loops import check_searched, identified, why_two_planes
 from wristctl.commands.kept_studies import gains_content, keep_study, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
 from wristctl.commands.procedure import Procedure
@@ -60,14 +60,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size
     from wristctl.simulation.planes import planes_of
-    from wristctl.tuning.search import check_tunable
 
     study = on_the_rig(identified(study, "recommend", inputs))
     settings = study.recommend
     with under("recommend"):
-        for number, name in enumerate(settings.controllers):
-            with under(f"controllers.{number}"):
-                check_tunable(controller(name))
+        check_searched(settings.controllers)
     reach = reach_deg(study)
     if reach < LEAST_DEG:
         reason = f"the tendons hold the wrist to {reach:g} deg only: no controller can help"

@@ -11,6 +11,7 @@ from wristctl.commands.inputs_of_loops import (
     check_family_reach,
     check_inverses,
     check_row,
+    check_searched,
     family_of,
     inverses_of,
 )
@@ -40,9 +41,8 @@ if TYPE_CHECKING:
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check all names, and state the number of rollouts."""
-    from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size, check_steps
-    from wristctl.tuning.search import check_optimiser, check_tunable
+    from wristctl.tuning.search import check_optimiser
 
     settings = study.study
     with under("study"):
@@ -51,9 +51,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             raise UserError("no families of worlds", "families", "include some of experiments/scenarios")
         for name in (*families_of(study), *filter(None, [settings.varied])):
             family_of(study.families, name, "families")
-        for number, name in enumerate(settings.laws):
-            with under(f"controllers.{number}"):
-                check_tunable(controller(name))
+        check_searched(settings.laws)
         for number, row in enumerate(settings.presets):
             with under(f"presets.{number}"):
                 check_row(row, None)

@@ -13,6 +13,7 @@ from wristctl.commands.inputs_of_loops import (
     check_family_reach,
     check_inverses,
     check_reach,
+    check_searched,
     family_of,
     identified,
     inverses_of,
@@ -124,14 +125,10 @@ def planned_search(study: Study, inputs: Inputs) -> str:
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import check_size
     from wristctl.simulation.planes import planes_of
-    from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
+    from wristctl.tuning.search import check_loops, check_optimiser
 
     settings = study.tune
-    for number, name in enumerate(settings.controllers):
-        try:
-            check_tunable(controller(name))
-        except UserError as error:
-            raise error.at(f"controllers.{number}") from error
+    check_searched(settings.controllers)
     try:
         check_optimiser(settings)
     except UserError as error:
