@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import ends_of_family, identified
+from wristctl.commands.inputs_of_loops import ends_of_family, identified, judged_loops
 from wristctl.commands.printed_table import joined
 from wristctl.commands.results import Findings
 from wristctl.commands.study.published import what_changed
@@ -249,6 +249,22 @@ def warn_out_of_reach(findings: Findings, wrist: WristParameters, asked: Iterabl
     if unreachable:
         findings.numerics(out_of_reach=[str(motion) for motion in unreachable])
     return unreachable
+
+
+def warn_of_loops(
+    findings: Findings,
+    study: Study,
+    settings: SimulateSettings | TuneSettings | CompareSettings,
+    asked: Iterable[Asked],
+    planes: int = 1,
+) -> list[OutOfReach]:
+    """Warn of loops of a section that buckle or are integrated coarsely, of what is left out of one plane, and of
+    motions out of reach; these are returned."""
+    loops = [settings.loop] if isinstance(settings, SimulateSettings) else list(judged_loops(study, settings).values())
+    warn_if_it_buckles(findings, study.wrist, loops, planes)
+    warn_if_coarse(loops)
+    warn_of_one_plane(study.wrist, asked)
+    return warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
 
 
 def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:

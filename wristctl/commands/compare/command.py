@@ -26,15 +26,7 @@ from wristctl.commands.inputs_of_loops import (
     why_two_planes,
     with_what_there_is,
 )
-from wristctl.commands.loop_warnings import (
-    asked_by,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_of_earlier_families,
-    warn_of_lost,
-    warn_of_one_plane,
-    warn_out_of_reach,
-)
+from wristctl.commands.loop_warnings import warn_of_earlier_families, warn_of_loops, warn_of_lost
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -202,11 +194,8 @@ def compare(session: Session) -> Compared:
         log.warning("left out: %s", "; ".join(left_out))
     settings = study.compare
     loops = judged_loops(study, study.compare).values()
-    warn_if_it_buckles(findings, study.wrist, loops)
-    warn_if_coarse(loops)
     warn_of_earlier_families(settings.rows)
-    warn_of_one_plane(study.wrist, asked_of_comparison(study))
-    warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
+    warn_of_loops(findings, study, settings, asked_of_comparison(study))
     network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
     if settings.tuning is not None:
         tuning = study.model_copy(update={"tune": settings.tuning})

@@ -23,16 +23,7 @@ from wristctl.commands.inputs_of_loops import (
 )
 from wristctl.commands.kept_studies import asked_for, keep_study
 from wristctl.commands.live_record import check_live, listened
-from wristctl.commands.loop_warnings import (
-    OutOfReach,
-    asked_by,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_if_outside,
-    warn_of_one_plane,
-    warn_out_of_reach,
-    warn_outside_conditions,
-)
+from wristctl.commands.loop_warnings import OutOfReach, warn_if_outside, warn_of_loops, warn_outside_conditions
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.results import Simulated, metrics_table, trajectory_table
@@ -89,11 +80,8 @@ def simulate(session: Session) -> Simulated:
     asked, session = session.study, replace(session, study=listened(session))
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist, planes = study.simulate, study.wrist, planes_of_simulation(study)
-    warn_if_it_buckles(findings, wrist, [settings.loop], planes)
-    warn_if_coarse([settings.loop])
-    warn_of_one_plane(wrist, asked_of_simulation(study))
     warn_outside_conditions([settings], [settings.loop])
-    beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
+    beyond = warn_of_loops(findings, study, settings, asked_of_simulation(study), planes)
     network = network_for(session.inputs, wrist, [settings.loop], planes)
     with session.progress("simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))

@@ -21,14 +21,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     why_two_planes,
 )
-from wristctl.commands.loop_warnings import (
-    asked_by,
-    refuse_out_of_reach,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_of_one_plane,
-    warn_out_of_reach,
-)
+from wristctl.commands.loop_warnings import refuse_out_of_reach, warn_of_loops
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -180,10 +173,7 @@ def tune(session: Session) -> Tuned:
 
     study = identified(session.study, "tune", session.inputs)
     loops = judged_loops(study, study.tune).values()
-    warn_if_it_buckles(session.findings, study.wrist, loops)
-    warn_if_coarse(loops)
-    warn_of_one_plane(study.wrist, asked_of_search(study))
-    warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
+    warn_of_loops(session.findings, study, study.tune, asked_of_search(study))
     planes = 2 if why_two_planes(study.wrist, asked_of_search(study)) else 1
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
