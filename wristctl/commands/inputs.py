@@ -43,6 +43,11 @@ class EarlierRun:
     content: Content | None = None
 
 
+# What several commands read: the network of a reference, gains that were tuned, and a wrist that was identified.
+NETWORK, TUNED = EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)
+FROM_IDENTIFIED = EarlierRun("from_identified", kind="identify", optional=True)
+
+
 class Inputs(dict[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 

@@ -9,7 +9,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
     check_family_reach,
@@ -273,11 +273,7 @@ COMPARE = sweepable(
         "compare",
         plan,
         compare,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("tuned", kind="tune", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
-        ),
+        (NETWORK, TUNED, FROM_IDENTIFIED),
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_comparison(study)),
     )

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, Inputs
 from wristctl.commands.inputs_of_loops import check_searched, identified, why_two_planes
 from wristctl.commands.kept_studies import gains_content, keep_study, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
@@ -321,6 +321,6 @@ RECOMMEND = Procedure(
     "recommend",
     plan,
     recommend,
-    (EarlierRun("from_identified", kind="identify", optional=True),),
+    (FROM_IDENTIFIED,),
     in_one_plane=_in_one_plane,
 )

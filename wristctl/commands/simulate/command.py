@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverses,
@@ -183,11 +183,7 @@ SIMULATE = sweepable(
         "simulate",
         plan,
         simulate,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("tuned", kind="tune", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
-        ),
+        (NETWORK, TUNED, FROM_IDENTIFIED),
         size=size,
         in_one_plane=lambda study: planes_of_simulation(study) == 1,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_search,
     check_family_reach,
@@ -203,11 +203,7 @@ TUNE = sweepable(
         "tune",
         plan,
         tune,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
-            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
-        ),
+        (NETWORK, FROM_IDENTIFIED, EarlierRun("resume", kind="tune", optional=True, unfinished=True)),
         doubts=refuse_out_of_reach,
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_search(study)),
