@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wristctl.arrays import Array
 from wristctl.commands.ranking_tables import decision_table
-from wristctl.commands.study.results import answer_of
+from wristctl.commands.study.answer import answer_of
 from wristctl.comparison.controller_ranking import undominated
 from wristctl.comparison.tuned_ranking import TermValue, TunedRanking, order_shift, term_values, tuned_ranking
 from wristctl.comparison.world_ranking import RANKED, RankedRow

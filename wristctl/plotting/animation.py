@@ -58,10 +58,10 @@ def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
     many = table["inverse"].nunique() > 1
     arcs = {name for name, loop in run.config.compare.loops.items() if loop.plant.model == "pcc"}
     courses: list[Named] = []
-    for row, angles, wanted in zip(table.itertuples(), bent, series["theta_desired"], strict=True):
-        if row.loop in arcs:
-            group = f"{row.loop}, {row.reference}" + f", {row.inverse} inverse" * many
-            courses.append((group, f"{row.controller}/{row.gains}", str(row.controller), angles, wanted))
+    for row, angles, wanted in zip(table.to_dict("records"), bent, series["theta_desired"], strict=True):
+        if row["loop"] in arcs:
+            group = f"{row['loop']}, {row['reference']}" + f", {row['inverse']} inverse" * many
+            courses.append((group, f"{row['controller']}/{row['gains']}", str(row["controller"]), angles, wanted))
     return courses, series["time"][0]
 
 

@@ -148,7 +148,7 @@ class Studied(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Controller for each rig, gain of each term, and reliability of the order."""
-        from wristctl.commands.study.results import answer_of
+        from wristctl.commands.study.answer import answer_of
 
         of_families = {name: asked_of_family(self.study, name) for name in families_of(self.study)}
         bending = [why_two_planes(self.study.wrist, asked, f" of {name}") for name, asked in of_families.items()]

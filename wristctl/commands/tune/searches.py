@@ -138,8 +138,9 @@ def keep_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[str
     trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
     for name, values in gains.items():
         title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
-        sections = {"simulate": asked, "compare": {"loops": loops}, "hw_run": trial}
-        keep_study(findings, file_of(name), title, gains_content(study, [row_of(name, values)], **sections))
+        rows = [row_of(name, values)]
+        content = gains_content(study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
+        keep_study(findings, file_of(name), title, content)
 
 
 def margins(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
