@@ -87,11 +87,6 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         return None
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
-    numbers: Sequence[int] = range(1, len(places) + 1)
-    if run.kind == "hw-run":
-        from wristctl.trial.rig_belief import layout_of_rig, numbers_of
-
-        numbers = numbers_of(layout_of_rig(run.config.hw_run, run.config.wrist))
     groups = {
         "bends": ([f"bend_{k + 1}_{plane}" for k in range(loop.plant_segments) for plane in planes], ANGLE),
         "wanted": ([f"bend_ref_{plane}" for plane in planes], ANGLE),
@@ -116,7 +111,7 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         "wrist": {"length": wrist.length, "discs": wrist.discs, "rim": rim(wrist), "hand": wrist.hand_offset},
         "tendons": [
             {**cable._asdict(), "number": number, "colour": TENDON_COLOURS[k % len(TENDON_COLOURS)]}
-            for k, (cable, number) in enumerate(zip(places, numbers, strict=True))
+            for k, (cable, number) in enumerate(zip(places, _numbers(run, len(places)), strict=True))
         ],
         "units": {"angle": ANGLE, "place": PLACE, "pull": PULL},
         "from": {"azimuth": AZIMUTH, "elevation": ELEVATION},
@@ -126,6 +121,15 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         name: np.rint(part / unit).astype(np.int64).tolist()
         for part, (name, (_, unit)) in zip(parts, groups.items(), strict=True)
     }
+
+
+def _numbers(run: Run, count: int) -> Sequence[int]:
+    """Numbers of the tendons in the run's tables."""
+    if run.kind == "simulate":
+        return range(1, count + 1)
+    from wristctl.trial.rig_belief import layout_of_rig, numbers_of
+
+    return numbers_of(layout_of_rig(run.config.hw_run, run.config.wrist))
 
 
 def _performed(run: Run, columns: list[str]) -> dict[str, Array] | None:
