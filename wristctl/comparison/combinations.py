@@ -127,6 +127,11 @@ def count_rollouts(chosen: CompareSettings) -> int:
     )
 
 
+def within(progress: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None]:
+    """Progress of a part that takes a task from one share of it to another."""
+    return lambda share: None if progress is None else progress(begin + share * (end - begin))
+
+
 def compare(
     study: Study,
     network: Inverse | None = None,
@@ -158,15 +163,10 @@ def compare(
                 len(rows) * len(courses), -1
             )
             which = np.tile(np.arange(len(courses)), len(rows))
-            base = part + before[number]
-
-            def report(share: float, base: float = base, number: int = number) -> None:
-                if progress is not None:
-                    progress((base + share * (before[number + 1] - before[number])) / len(conditions))
-
+            begin, end = ((part + share) / len(conditions) for share in before[number : number + 2])
             repetitions = repeat(
                 controller(name), batch, motions, which, condition.loop, condition.wrist, scenarios, draws,
-                chosen.repetitions, progress=report,
+                chosen.repetitions, progress=within(progress, begin, end),
             )  # fmt: skip
             for index, repeated in enumerate(repetitions):
                 row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.comparison.combinations import within
 from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted, time_at_limits
 from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
@@ -107,15 +108,10 @@ def rank(
         rows.append(Row(controller=YARDSTICK, gains="default"))
     kinds, every = kinds_of(family), list[Measured]()
     laws = [controller(row.controller) for row in rows]
-    repetitions = [law.learning for law in laws]
-    for number, (law, row) in enumerate(zip(laws, rows, strict=True)):
-
-        def report(share: float, number: int = number) -> None:
-            if progress is not None:
-                progress((sum(repetitions[:number]) + share * repetitions[number]) / sum(repetitions))
-
+    ends = np.cumsum([0, *(law.learning for law in laws)]) / sum(law.learning for law in laws)
+    for law, row, begin, end in zip(laws, rows, ends[:-1], ends[1:], strict=True):
         gains = np.array([gains_of(law, row.gains, tuned, family.loop)])
-        every.append(measure(law, gains, cases, study.wrist, RANKED, report))
+        every.append(measure(law, gains, cases, study.wrist, RANKED, within(progress, begin, end)))
     rankings = []
     for kind, chosen in kinds.items():
         measured = [one.of_motions(chosen, len(family.references)) for one in every]
