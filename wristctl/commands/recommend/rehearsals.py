@@ -97,15 +97,13 @@ def rehearsed(
     """
     runs: list[dict[float, Rehearsed]] = [{} for _ in rows]
     around: list[dict[float, Rehearsed]] = [{} for _ in rows]
-    shares = dict.fromkeys((study.hw_run.bench.plant.stiffness_scale, 1.0))  # the emulated rig's own, and 1
-    scales = [share for share in shares if share >= _weakest(study)]
+    scales = _scales(study)
     with session.progress("rehearsing on the emulated rig", total=len(scales), unit="rigs") as advance:
         for number, scale in enumerate(scales, start=1):
             asked = _asked(study, rows, reach_deg, planes, scale)
             _rehearse(study, asked, scale, runs)
             if planes == 2 and not has_path(asked):
-                circle = {"kind": "circumduction", "angle_deg": abs(asked.reference.end_deg)}
-                circling = asked.model_copy(update={"reference": Reference.model_validate(circle)})
+                circling = asked.model_copy(update={"reference": _circling(asked.reference)})
                 _rehearse(study, circling, scale, around)
             advance(number)
     return [Rehearsal(*each) for each in zip(runs, around, strict=True)]
@@ -117,6 +115,11 @@ def _rehearse(study: Study, asked: HwRunSettings, scale: float, runs: Sequence[d
         done = rehearse(study.model_copy(update={"hw_run": asked}))
     for of_candidate, run in zip(runs, done, strict=True):
         of_candidate[scale] = run
+
+
+def _circling(reference: Reference) -> Reference:
+    """The hand circles with a bend as large as the reference's."""
+    return Reference.model_validate({"kind": "circumduction", "angle_deg": abs(reference.end_deg)})
 
 
 @contextmanager
@@ -143,6 +146,12 @@ def motions_of_trial(study: Study, reach_deg: float, planes: int) -> tuple[list[
     toward = dict.fromkeys(TOWARD[direction] for direction in settings.directions)
     line = {"kind": "diagonal", "duration": asked.duration, "angle_deg": asked.end_deg}
     return [Reference.model_validate({**line, "toward_deg": angle}) for angle in toward], settings.horizon
+
+
+def _scales(study: Study) -> list[float]:
+    """Shares of the believed stiffness: the emulated rig's own, where springs may be as weak, and 1."""
+    shares = dict.fromkeys((study.hw_run.bench.plant.stiffness_scale, 1.0))
+    return [share for share in shares if share >= _weakest(study)]
 
 
 def _weakest(study: Study) -> float:
