@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 from wristctl.board.messages import AXES
@@ -51,8 +50,8 @@ FROM_IDENTIFIED = EarlierRun("from_identified", kind="identify", optional=True)
 class Inputs(dict[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 
-    def __init__(self, by_role: Mapping[str, Given] = MappingProxyType({})) -> None:
-        super().__init__(by_role)
+    def __init__(self, by_role: Mapping[str, Given] | None = None) -> None:
+        super().__init__(by_role or {})
         self._read: dict[tuple[str, Any], Any] = {}
 
     def read(self, role: str, reader: Callable[[Any], Read]) -> Read | None:

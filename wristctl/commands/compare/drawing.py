@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import pandas as pd
 
@@ -67,14 +68,15 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
-    tendons, overlay = "each tendon", partial(findings.figure, f"overlay-{slug}", bend_overlay, courses)
-    if courses[0].planes == 1:
-        tendons = "both sides"
-        overlay = partial(findings.figure, f"overlay-{slug}", over_time, courses, "angle", "measurable size")
-    caption = f"Angle and error of the best controllers and of the paper's, {where}"
-    overlay(heading=where, later=ranking.jumps, caption=caption)
+    one_plane, caption = courses[0].planes == 1, f"Angle and error of the best controllers and of the paper's, {where}"
+    options: dict[str, Any] = {"heading": where, "later": ranking.jumps, "caption": caption}
+    if one_plane:
+        findings.figure(f"overlay-{slug}", over_time, courses, "angle", "measurable size", **options)
+    else:
+        findings.figure(f"overlay-{slug}", bend_overlay, courses, **options)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", over_time, courses, "size", heading=where, caption=caption)
+    tendons = "both sides" if one_plane else "each tendon"
     later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
     if repeated := [result.repeated for result in shown if len(result.repeated.failed) > 1]:
         caption, sizes = f"|error| over repetitions: median and 95 % interval, {where}", spread_of_sizes(repeated)

@@ -142,7 +142,12 @@ def _printed(settings: TrainSettings, name: str, measure: str) -> float | None:
 
 def best_row(trials: dict[str, list[TrainingResult]]) -> tuple[str, list[TrainingResult]]:
     """The network whose best training has the least validation loss, and all its trainings."""
-    return min(trials.items(), key=lambda item: min(np.nan_to_num([t.validation_loss for t in item[1]], nan=np.inf)))
+
+    def least(results: list[TrainingResult]) -> float:
+        losses = [result.validation_loss for result in results]
+        return min((loss for loss in losses if math.isfinite(loss)), default=math.inf)
+
+    return min(trials.items(), key=lambda item: least(item[1]))
 
 
 def grid_tables(findings: Findings, choice: Choice) -> list[Table]:
