@@ -21,7 +21,6 @@ from wristctl.commands.train.learned_dynamics import TrainedDynamics, check_dyna
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
-from wristctl.processes import cores
 from wristctl.records import Run
 from wristctl.records.files import check_plain
 
@@ -108,6 +107,7 @@ def _train_all(
     from wristctl.learning.training_processes import train_all
     from wristctl.learning.training_result import Epoch
     from wristctl.learning.transitions import Transitions
+    from wristctl.processes import cores
 
     settings = session.study.train
     device = settings.device
