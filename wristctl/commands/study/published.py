@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.study.units import BASE, StudyPlace
 from wristctl.config.families import Family, Range
-from wristctl.study_files.load import load_study
-from wristctl.study_files.shipped import shipped
 
 if TYPE_CHECKING:
     from wristctl.comparison.tuned_ranking import TunedRanking
@@ -84,6 +82,9 @@ def what_changed(name: str, family_sha256: str, drive: int | None) -> str:
 
 @cache
 def _shipped_family(name: str) -> Family | None:
+    from wristctl.study_files.load import load_study
+    from wristctl.study_files.shipped import shipped
+
     file = shipped() / "scenarios" / f"{name}.yaml"
     return load_study([file]).families.get(name) if file.is_file() else None
 
