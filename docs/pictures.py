@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from shots import shot
 
 from wristctl.commands.analyse.hysteresis_figures import loops as loops_by_speed
-from wristctl.commands.ranking_drawing import places_of
+from wristctl.commands.ranking_tables import places_of
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.controller_ranking import class_rankings
 from wristctl.comparison.paper import T2

@@ -268,7 +268,7 @@ def test_units_of_the_table_are_those_of_the_metrics(compare: Compare, tmp_path:
     done = compare(rows)
     with pytest.MonkeyPatch.context() as during:
         during.setattr(combinations, "compare", lambda *_: rows)
-        during.setattr("wristctl.commands.compare.command.draw", lambda *_: None)
+        during.setattr("wristctl.commands.compare.drawing.draw", lambda *_: None)
         kept = wristctl.compare(done.study, out=tmp_path)
     assert kept.run is not None
     columns = {each["name"]: each for each in _columns(kept.run)}

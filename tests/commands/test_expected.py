@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.recommend.candidate import Candidate, spread
 from wristctl.commands.recommend.expected import (
     FACTS,
     IDENTIFIED,
+    Candidate,
     Expected,
     Fact,
     Left,
@@ -21,6 +21,7 @@ from wristctl.commands.recommend.expected import (
     _over_rigs,
     asked_for,
     expected,
+    spread,
 )
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study

@@ -148,7 +148,7 @@ def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(don
 def test_how_often_a_controller_is_first_is_data(done: Studied) -> None:
     ranking, table = done.rankings["rig"], run_of(done).data("firsts").set_index("row")
     for label, line in table.iterrows():
-        firsts = ranking.firsts(ranking.labels.index(str(label)))
+        firsts = ranking.firsts[ranking.labels.index(str(label))]
         assert tuple(line[["first_in_halves", "first_in_tunings", "tunings"]]) == firsts and line["halves"] == 50
     assert table["first_in_halves"].sum() == 50 and table["first_in_tunings"].sum() == 2, "one is first in every half"
 

@@ -17,10 +17,9 @@ import wristctl
 from tests.commands.small_recommendation import RIG, study_of
 from wristctl.commands.kept_studies import gains_content, hw_run_fits, row_of, study_text
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Recommended
-from wristctl.commands.recommend.candidate import Candidate, spread
 from wristctl.commands.recommend.command import _limit
+from wristctl.commands.recommend.expected import FAMILY, TOLERATED, Candidate, spread
 from wristctl.commands.recommend.figures import errors
-from wristctl.commands.recommend.reach import FAMILY, TOLERATED
 from wristctl.commands.recommend.rehearsals import Rehearsal
 from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of
 from wristctl.config.loop import Loop, Reference

@@ -9,7 +9,8 @@ import pytest
 
 import wristctl
 from tests.commands.small_recommendation import RIG, study_of
-from wristctl.commands.recommend.reach import FAMILY, family_of_rigs, reach_deg
+from wristctl.commands.recommend.expected import FAMILY
+from wristctl.commands.recommend.reach import family_of_rigs, reach_deg
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.drawn_worlds import drawn_cases

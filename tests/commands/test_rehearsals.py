@@ -14,8 +14,8 @@ import wristctl
 from wristctl.commands.adoption import with_planes
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.answer import Recommended
-from wristctl.commands.recommend.candidate import Candidate
 from wristctl.commands.recommend.command import plan
+from wristctl.commands.recommend.expected import Candidate
 from wristctl.commands.recommend.rehearsals import (
     Rehearsal,
     _asked,

@@ -8,8 +8,8 @@ import pytest
 
 import wristctl
 from wristctl.commands.printed_table import Table
-from wristctl.commands.train.answer import answer_of
 from wristctl.commands.train.command import Trained
+from wristctl.commands.train.results import answer_of
 
 SMALL = ("seed=3", "gen-data.samples=40", "train={hidden: [4], activation: tanh, epochs: 3, workers: 1}")
 

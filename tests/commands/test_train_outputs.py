@@ -15,8 +15,8 @@ import pytest
 import wristctl
 from tests.commands.conftest import columns_of, known_of, session
 from wristctl.commands.results import Findings
+from wristctl.commands.train import results
 from wristctl.commands.train.results import best_row, error_table, keep_network, timing_table, trial_table
-from wristctl.learning import inference, network_file
 from wristctl.learning.dataset import Samples, Split, draw_samples
 from wristctl.learning.evaluation import ANGLE_MEASURES, Place, places
 from wristctl.learning.training_result import Epoch
@@ -144,13 +144,13 @@ def test_a_run_keeps_the_map_of_errors(tmp_path: Path) -> None:
 
 def test_time_is_taken_of_each_inverse_on_its_own_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for at, name in enumerate(("network", "polynomial"), start=1):
-        monkeypatch.setattr(inference, f"compiled_{name}", lambda _of, at=at: at)
-    monkeypatch.setattr(inference, "compiled_exact", 3)
+        monkeypatch.setattr(results, f"compiled_{name}", lambda _of, at=at: at)
+    monkeypatch.setattr(results, "compiled_exact", 3)
 
     def microseconds(code: int, inputs: Any) -> float:
         return float(100 * code + 10 * inputs.shape[1] + len(inputs))
 
-    monkeypatch.setattr(inference, "microseconds", microseconds)
+    monkeypatch.setattr(results, "microseconds", microseconds)
     with start_run("train", wristctl.load_study(None), "", tmp_path) as live:
         table = timing_table(Findings(0, live), result(), samples(others=True), SPLIT, 7.5)
     assert table.columns == ("inverse", "median [us]")
@@ -166,7 +166,7 @@ def test_the_networks_file_says_how_it_was_trained(tmp_path: Path, monkeypatch: 
         saved.append(given)
         given[1].write_bytes(b"network")
 
-    monkeypatch.setattr(network_file, "save_network", save)
+    monkeypatch.setattr(results, "save_network", save)
     network: Any = "network"
     row = "train.rows=[{name: tan, activation: tanh}]"
     digest = {}

@@ -109,7 +109,7 @@ def test_where_some_cases_fail_the_error_is_the_geometric_mean_of_those_where_bo
         failed = np.arange(3) < (lost if law.name == "pid" else 0)
         return SimpleNamespace(failed=failed[None], metrics={"rmse": np.array([errors[law.name]])})
 
-    monkeypatch.setattr("wristctl.simulation.cases.measure", measured)
+    monkeypatch.setattr("wristctl.commands.tune.answer.measure", measured)
     whole = dict.fromkeys(controller("pid").gains, 1.0)
     (beside,) = beside_feedforward({"pid": whole}, [], WristParameters()).values()
     assert beside.cases == 3 - lost

@@ -57,7 +57,7 @@ def test_neighbours_lie_to_both_sides_of_a_setting_by_up_to_5_percent(monkeypatc
         moved.extend(settings)
         return np.array([1.0, 2.0, 1.5, np.inf]), None, None
 
-    monkeypatch.setattr(best_case, "_courses", lambda row, settings: settings)
+    monkeypatch.setattr(best_case, "courses", lambda row, settings: settings)
     monkeypatch.setattr(best_case, "closest", closest_to)
     box, begin = Box(unknowns={"wrist.length": Unstated(draw=(0.05, 0.12))}), setting(WRIST)
     share = best_case._near(box, WRIST, PRINTED, "strict", begin, np.random.default_rng(0))

@@ -13,8 +13,7 @@ from wristctl.arrays import Array
 from wristctl.commands.ranking_tables import decision_table
 from wristctl.commands.study.answer import answer_of
 from wristctl.comparison.controller_ranking import undominated
-from wristctl.comparison.paired_worlds import TermValue, order_shift, term_values
-from wristctl.comparison.tuned_ranking import TunedRanking, tuned_ranking
+from wristctl.comparison.tuned_ranking import TermValue, TunedRanking, order_shift, term_values, tuned_ranking
 from wristctl.comparison.world_ranking import RANKED, RankedRow
 from wristctl.config.families import Family
 from wristctl.simulation.cases import Measured

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.comparison.repeated_tunings import HALVES, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.repeated_tunings import HALVES, RepeatedTunings, firsts, median_tuning
 
 # Standard deviations of what a tuning, a world, both together and a stream of noise do to a logarithm.
 SPREADS = {
@@ -125,8 +125,7 @@ def test_firsts_are_counted_over_halves_and_tunings() -> None:
     drawn[1, :, 20:] -= 1.0
     drawn[1, 0] -= 1.5
     drawn[2] -= 9.0
-    order = Order(drawn, [0, 1], 1)
-    first, second = order.firsts(0), order.firsts(1)
+    first, second = firsts(drawn, [0, 1], 1).values()
     assert (first.tunings, second.tunings, first.of_tunings) == (2, 1, 3)
     assert first.halves + second.halves == HALVES and min(first.halves, second.halves) > 0
 

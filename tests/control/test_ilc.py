@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.commands.simulate.answer import controller_words
+from wristctl.commands.simulate.results import controller_words
 from wristctl.config.loop import CAMERA, Loop, Reference
 from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters

@@ -10,8 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from wristctl.api import load_study
-from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
-from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
+from wristctl.commands.compare.figures import (
+    error_against_variation,
+    error_over_disturbance,
+    rmse_map,
+    tension_rows,
+    variation_dots,
+)
 from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, bends_over_time, lateness
 from wristctl.commands.hw_run.figures import errors as trial_errors
 from wristctl.commands.hw_run.figures import tensions as trial_tensions

@@ -9,7 +9,7 @@ import pytest
 
 from tests.commands.conftest import repeated
 from wristctl.api import load_study
-from wristctl.commands.compare.class_figures import error_against_variation
+from wristctl.commands.compare.figures import error_against_variation
 from wristctl.comparison.bootstrap import MEASURABLE
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.controller_ranking import Ranking, class_rankings

@@ -111,8 +111,9 @@ def test_a_real_wrist_of_which_one_arc_is_seen_bends_by_its_share_in_every_segme
     bends = [f"bend_{k}_{plane}" for k in (1, 2, 3, 4) for plane in ("ulnar", "flexion")]
     table = view_module._performed(run, ["time", *bends, "tip_x"])
     assert table is not None
-    np.testing.assert_allclose(table[:, 1:9], np.tile(whole.bend / 4.0, 4))
-    assert np.array_equal(table[:, 0], whole.time) and np.array_equal(table[:, 9], seen_as_one.columns()["tip_x"])
+    np.testing.assert_allclose(np.stack([table[name] for name in bends], axis=1), np.tile(whole.bend / 4.0, 4))
+    assert np.array_equal(table["time"], whole.time)
+    assert np.array_equal(table["tip_x"], seen_as_one.columns()["tip_x"])
 
 
 def test_tendons_have_the_numbers_of_the_runs_tables() -> None:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from tests.comparison.test_fair_answer import HARD, WORLDS, ranked, row
 from wristctl.commands.study.figures import pareto, terms_by_rig, world_map
 from wristctl.comparison.bootstrap import GeometricMean
-from wristctl.comparison.paired_worlds import TermValue
+from wristctl.comparison.tuned_ranking import TermValue
 from wristctl.comparison.world_ranking import RankedRow
 from wristctl.plotting.ranking_figures import probability_of_better, ranking_intervals
 from wristctl.plotting.style import BLACK, BLUE, SILVER, VERMILLION, colour, for_paper

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from wristctl.board.messages import AXES
 from wristctl.commands.inputs_of_loops import judged_loops
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, RIGS, Choices
 from wristctl.config.controller_row import BY_LOOP, Row
@@ -73,7 +74,7 @@ def adopted(study: Study, command: str) -> Adopted:
     if "recommend" in read and study.recommend.rig is not None:
         from wristctl.commands.recommend.own_rig import with_facts
 
-        study = with_facts(study, study.recommend.rig)
+        study = with_facts(study)
     if not origins:
         return Adopted(study, ())
     called = renamed_fields(study, own_name, read)
@@ -121,7 +122,6 @@ def wound_in_both_planes(wrist: WristParameters) -> bool:
     """Whether a board winds the wrist's tendons, and they are not those of two sides: it bends in both planes then."""
     if wrist.tendons == "four":
         return False
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import off_both_sides, wound_by
 
     try:
@@ -152,16 +152,12 @@ def with_presets(study: Study, command: str, tell: bool = True, for_several: boo
         return study
     name = command.replace("-", "_")
     section = getattr(study, name)
-    rows = tuple(_with_preset(_by_loop(row, _loops(study, command), tell), tell) for row in section.rows)
+    loops: Collection[Loop] = ()  # none for the trials of a rig
+    if command == "compare":
+        with under(command):
+            loops = judged_loops(study, study.compare).values()
+    rows = tuple(_with_preset(_by_loop(row, loops, tell), tell) for row in section.rows)
     return study.model_copy(update={name: section.model_copy(update={"rows": rows})})
-
-
-def _loops(study: Study, command: str) -> Collection[Loop]:
-    """Loops that the rows of `compare` are judged on; none for the trials of a rig."""
-    if command == "hw-run":
-        return ()
-    with under(command):
-        return judged_loops(study, study.compare).values()
 
 
 def _by_loop(row: _Row, loops: Collection[Loop], tell: bool) -> _Row:
@@ -263,21 +259,17 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         if not (isinstance(entry, type) and issubclass(entry, Optimiser)):
             raise UserError(f"{origin.attribute} is no Optimiser", str(origin.file), "derive it from Optimiser")
         entry_name = str(entry.name)
-    elif table.what == RIGS.what:
-        from wristctl.trial.rig_settings import check_facts
-
-        check_facts(getattr(entry, "facts", None), origin.reference)
-        if not is_reference(name):
-            table.lend(name, entry, origin)
-        return name  # as a reference's
     else:
         from wristctl.simulation.reference import ReferenceKind
+        from wristctl.trial.rig_settings import check_facts
 
-        if not isinstance(entry, ReferenceKind):
+        if table.what == RIGS.what:
+            check_facts(getattr(entry, "facts", None), origin.reference)
+        elif not isinstance(entry, ReferenceKind):
             raise UserError(f"{origin.attribute} is no ReferenceKind", str(origin.file), "make it a ReferenceKind")
         if not is_reference(name):
             table.lend(name, entry, origin)
-        return name  # a reference has no name but its place, by which its section is read
+        return name  # rigs and references have no name but their place, by which their sections are read
     if table.belongs(entry_name) or (entry_name in entry_point_names(table.group) and is_reference(name)):
         reason = f"there is a {table.what} '{entry_name}' already"
         raise UserError(reason, origin.reference, f'rename this one: name="my-{entry_name}"')

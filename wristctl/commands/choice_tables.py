@@ -17,11 +17,6 @@ def _entries(table: Choices[Any]) -> dict[str, Any]:
     return {name: table[name] for name in table.known()}
 
 
-def _about(module: str) -> str:
-    """The first sentence of a module."""
-    return first_sentence((sys.modules[module].__doc__ or "").split("\n\n")[0])
-
-
 def first_sentence(text: str) -> str:
     """The first sentence of a text, without its full stop; a full stop within brackets ends none."""
     line, depth = " ".join(text.split()), 0
@@ -34,7 +29,10 @@ def first_sentence(text: str) -> str:
 
 def controllers() -> Table:
     """Every controller, the names of its presets, and what it is."""
-    rows = [(name, ", ".join(law.presets), _about(law.law.__module__)) for name, law in _entries(CONTROLLERS).items()]
+    rows = []
+    for name, law in _entries(CONTROLLERS).items():
+        about = (sys.modules[law.law.__module__].__doc__ or "").split("\n\n")[0]
+        rows.append((name, ", ".join(law.presets), first_sentence(about)))
     return Table("", ("controller", "presets", "what it is"), rows)
 
 
@@ -79,9 +77,5 @@ def metrics() -> Table:
 
 
 TABLES: Mapping[str, Callable[[], Table]] = {
-    "controllers": controllers,
-    "presets": presets,
-    "references": references,
-    "conditions": conditions,
-    "metrics": metrics,
+    table.__name__: table for table in (controllers, presets, references, conditions, metrics)
 }

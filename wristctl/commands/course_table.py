@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from wristctl.config.wrist import WristParameters
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.arrays import Array
-    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.trajectory import Trajectory
 
 _PLANES = ("ulnar", "flexion")
@@ -20,16 +21,9 @@ def course_table(
 ) -> pd.DataFrame:
     """One row per instant, SI units: time, bend, reference and torque of each plane, tensions by place, and the tip.
 
-    Parameters
-    ----------
-    time
-        (T,) [s].
-    bend, reference, torque
-        (T, P) [rad], [rad], [N m]; in two planes the columns end in _ulnar and _flexion.
-    tension
-        Commanded tension of one tendon of each place, (T,) [N].
-    tip
-        Centre of the last disc, (T, P + 1) [m]: along the straight wrist, then across.
+    Of `time` (T,) [s], `bend` and `reference` [rad] and `torque` [N m] (T, P), which in two planes end in _ulnar and
+    _flexion, the commanded tension of one tendon of each place (T,) [N], and the centre of the last disc (T, P + 1)
+    [m]: along the straight wrist, then across.
     """
     import pandas as pd
 

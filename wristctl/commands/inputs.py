@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from wristctl.board.messages import AXES
 from wristctl.commands.results import StudyResult
 from wristctl.config.loop import LIVE, Reference
 from wristctl.config.section import Section
@@ -41,34 +42,27 @@ class EarlierRun:
     content: Content | None = None
 
 
+# What several commands read: the network of a reference, gains that were tuned, and a wrist that was identified.
+NETWORK, TUNED = EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)
 IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
 """Files of an identify run with its wrist, as a study or by ratios; missing where too little was told."""
 _WRIST = Content(f"{IDENTIFIED} or {RATIOS}", "wrist")
 FROM_IDENTIFIED = EarlierRun("from_identified", kind="identify", optional=True, content=_WRIST)
 
 
-class Inputs(Mapping[str, Given]):
+class Inputs(dict[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 
     def __init__(self, by_role: Mapping[str, Given] | None = None) -> None:
-        self._by_role = dict(by_role or {})
+        super().__init__(by_role or {})
         self._read: dict[tuple[str, Any], Any] = {}
-
-    def __getitem__(self, role: str) -> Given:
-        return self._by_role[role]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._by_role)
-
-    def __len__(self) -> int:
-        return len(self._by_role)
 
     def read(self, role: str, reader: Callable[[Any], Read]) -> Read | None:
         """Content that `reader` makes of this input; None without the input."""
-        if role not in self._by_role:
+        if role not in self:
             return None
         if (role, reader) not in self._read:
-            source = self._by_role[role]
+            source = self[role]
             with source.reading() if isinstance(source, Run) else nullcontext():
                 self._read[role, reader] = reader(source)
         content: Read = self._read[role, reader]
@@ -76,13 +70,13 @@ class Inputs(Mapping[str, Given]):
 
     def runs(self) -> dict[str, Run]:
         """The run directories among them, by role."""
-        runs = {role: earlier if isinstance(earlier, Run) else earlier.run for role, earlier in self._by_role.items()}
+        runs = {role: earlier if isinstance(earlier, Run) else earlier.run for role, earlier in self.items()}
         return {role: run for role, run in runs.items() if run is not None}
 
     def recorded(self) -> list[InputRun]:
         """Inputs as the manifest of a run names them. Raises UserError where one is in memory only."""
         runs = self.runs()
-        for role, earlier in self._by_role.items():
+        for role, earlier in self.items():
             if role not in runs and isinstance(earlier, StudyResult):
                 fix = ("write it too: ", Call(command_of(earlier.kind), arguments=(Argument("out", metavar="DIR"),)))
                 raise UserError("a run directory names what it was made from, and this is in memory only", role, fix)
@@ -97,24 +91,10 @@ def opened(
     out: Path,
     beside: Sequence[Path] = (),
 ) -> Inputs:
-    """Inputs of a command by role.
+    """Inputs of a command by role: those that `named_inputs` has by leaf, else those that its section names.
 
-    Raises UserError for a run that is missing, of another kind, or not as it was sealed.
-
-    Parameters
-    ----------
-    kind
-        Name of the command.
-    section
-        Section of the study that names the inputs.
-    needs
-        Earlier runs that the command reads.
-    named_inputs
-        Inputs by leaf that come before those of the section.
-    out
-        Folder of the runs.
-    beside
-        Folders in which a run is looked for that is not in `out`.
+    A run is looked for in the folder `out`, then in those `beside` it. Raises UserError for a run that is missing, of
+    another kind, or not as it was sealed.
     """
     by_role: dict[str, Given] = {}
     for name in named_inputs.keys() - {need.leaf for need in needs}:
@@ -167,13 +147,11 @@ def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
             raise UserError(f"a {chosen.kind} result where a {need.kind} run is needed", need.leaf, fix)
         return chosen
     ref = chosen.path if isinstance(chosen, Run) else chosen
-    return _stopped(ref, need, out) if need.unfinished else require(ref, need.kind, out, need.content)
-
-
-def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
+    if not need.unfinished:
+        return require(ref, need.kind, out, need.content)
     run = open_run(ref, out)
-    if run.kind != wanted.kind:
-        raise UserError(f"a {run.kind} run where a {wanted.kind} run is needed", str(run.path), "name another")
+    if run.kind != need.kind:
+        raise UserError(f"a {run.kind} run where a {need.kind} run is needed", str(run.path), "name another")
     if run.state == "running":
         raise UserError("that run is still going on", str(run.path), "wait for it, or stop it first")
     return run
@@ -181,7 +159,6 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
 
 def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
     """UserError unless a board's four axes wind this wrist's tendons in so many planes."""
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import wound_by
 
     if planes == 1:
@@ -192,7 +169,6 @@ def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
 
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides, wound_by
 
     odd = off_both_sides(wrist)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.inputs import IDENTIFIED, RATIOS, Inputs, check_sides
 from wristctl.config.compare import CompareSettings
@@ -32,30 +32,6 @@ log = logging.getLogger(__name__)
 _RIG = "loop.actuator.level=tendon, loop.sensor.level=camera and loop.control_period=0.01 have them"
 
 
-class _Tuning(Protocol):
-    """Gains that were found, in memory."""
-
-    @property
-    def study(self) -> Study: ...
-
-    @property
-    def gains(self) -> Gains: ...
-
-
-class _Training(Protocol):
-    """A network that was trained, in memory."""
-
-    @property
-    def network(self) -> Network: ...
-
-
-class _Identification(Protocol):
-    """Parameters that were identified, in memory, as the text of a study file."""
-
-    @property
-    def yaml(self) -> str: ...
-
-
 def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None = None) -> None:
     """UserError, naming the key, for an unknown controller, preset or gain, or gains that are not among the tuned.
 
@@ -71,6 +47,18 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
         fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), "` shows the runs")
         raise UserError(f"no tuned gains of {law.name}{looked}", "gains", fix)
     gains_of(law, row.gains, tuned)
+
+
+def check_searched(names: Iterable[str]) -> None:
+    """UserError, naming its place, for a controller that is unknown or has no gains to search."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import check_tunable
+
+    for number, name in enumerate(names):
+        try:
+            check_tunable(controller(name))
+        except UserError as error:
+            raise error.at(f"controllers.{number}") from error
 
 
 def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
@@ -150,6 +138,14 @@ def asked_of_search(study: Study) -> list[Asked]:
     return asked_of_family(study, family) if family else asked_by(study.tune)
 
 
+def asked_of_comparison(study: Study) -> list[Asked]:
+    """The loops of the study's `compare` section with what they are asked for."""
+    from wristctl.comparison.combinations import asked_by
+
+    family = study.compare.worlds.family
+    return asked_of_family(study, family) if family else asked_by(study.compare)
+
+
 def asked_of_simulation(study: Study) -> list[Asked]:
     """The loop of the study's `simulate` section with what it is asked for."""
     from wristctl.simulation.planes import Asked
@@ -180,14 +176,6 @@ def check_motion(study: Study, planes: int) -> None:
     else:
         by_bends = chosen.model_copy(update={"reference": by_angles(chosen.reference)})
         asked_of(study.model_copy(update={"simulate": by_bends}), _CHECKED)
-
-
-def asked_of_comparison(study: Study) -> list[Asked]:
-    """The loops of the study's `compare` section with what they are asked for."""
-    from wristctl.comparison.combinations import asked_by
-
-    family = study.compare.worlds.family
-    return asked_of_family(study, family) if family else asked_by(study.compare)
 
 
 def why_two_planes(wrist: WristParameters, asked: Iterable[Asked], which: str = "") -> str:
@@ -256,7 +244,7 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
 
     Raises UserError for a wrist with other tendons than the command bends.
     """
-    found_by = inputs.read("from_identified", _what_was_found)
+    found_by = inputs.read("from_identified", found_in)
     if found_by is None:
         return study
     found = with_found(study, command, found_by)
@@ -301,17 +289,17 @@ def wrist_identified(inputs: Inputs) -> str:
     return f"the wrist identified in {run.id}" if run else "the identified wrist"
 
 
-def _gains(earlier: Run | _Tuning) -> Gains:
+def _gains(earlier: Any) -> Gains:
     from wristctl.control.table import read_gains
 
     return read_gains(earlier.file("data/gains.json")) if isinstance(earlier, Run) else earlier.gains
 
 
-def _tune_settings(earlier: Run | _Tuning) -> TuneSettings:
+def _tune_settings(earlier: Any) -> TuneSettings:
     return earlier.config.tune if isinstance(earlier, Run) else earlier.study.tune
 
 
-def _network(earlier: Run | _Training) -> Network:
+def _network(earlier: Any) -> Network:
     from wristctl.learning.network_file import NETWORK, load_network
 
     return load_network(earlier.file(NETWORK)) if isinstance(earlier, Run) else earlier.network
@@ -331,7 +319,6 @@ class Found:
 
 def with_found(study: Study, command: str, found: Found) -> Study:
     """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
-    from wristctl.commands.recommend.own_rig import narrowed
     from wristctl.identification.unknowns import with_identified
 
     text, told = found.yaml, None
@@ -348,28 +335,24 @@ def with_found(study: Study, command: str, found: Found) -> Study:
         found.said = True
         text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
     known = with_identified(study, command, text)
-    return narrowed(known, told) if command == "recommend" else known
+    if command != "recommend":
+        return known
+    from wristctl.commands.recommend.own_rig import narrowed
+
+    return narrowed(known, told)
 
 
-def found_in(run: Run) -> Found:
-    """What a run of `identify` has found. Raises UserError where that is no wrist."""
-    if run.has(IDENTIFIED):
-        return Found(run.id, run.file(IDENTIFIED).read_text(encoding="utf-8"))
-    if run.has(RATIOS):
-        return Found(run.id, "", read_json(run.file(RATIOS)))
-    raise _nothing_found(run.id)
-
-
-def _nothing_found(run: str) -> UserError:
-    return UserError("no wrist was identified there", run, "an identify run that did not refuse its logs or trials")
-
-
-def _what_was_found(earlier: Run | _Identification) -> Found:
-    if isinstance(earlier, Run):
-        return found_in(earlier)
-    found = Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
+def found_in(earlier: Any) -> Found:
+    """What a run or a result of `identify` has found. Raises UserError where that is no wrist."""
+    if not isinstance(earlier, Run):
+        found = Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
+    elif earlier.has(IDENTIFIED):
+        found = Found(earlier.id, earlier.file(IDENTIFIED).read_text(encoding="utf-8"))
+    else:
+        found = Found(earlier.id, "", read_json(earlier.file(RATIOS)) if earlier.has(RATIOS) else None)
     if not found.yaml and found.ratios is None:
-        raise _nothing_found(found.run)
+        fix = "an identify run that did not refuse its logs or trials"
+        raise UserError("no wrist was identified there", found.run, fix)
     return found
 
 
@@ -383,12 +366,8 @@ def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:
 
 def judged_loops(study: Study, settings: TuneSettings | CompareSettings) -> Mapping[str, Loop]:
     """The loops that gains are tuned or rows judged on, by name; of a family its loop before anything is drawn."""
-    worlds = settings.worlds
-    return (
-        {worlds.family: family_of(study.families, worlds.family, "worlds.family").loop}
-        if worlds.family
-        else settings.loops
-    )
+    name = settings.worlds.family
+    return {name: family_of(study.families, name, "worlds.family").loop} if name else settings.loops
 
 
 def compared_inverses(study: Study) -> Iterable[str]:

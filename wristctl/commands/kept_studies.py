@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
+from wristctl.board.messages import AXES
+from wristctl.commands.results import Findings
 from wristctl.config.choices import CONTROLLERS, REFERENCES, RIGS
 from wristctl.config.foreign import PLAIN
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.errors import UserError
-
-if TYPE_CHECKING:
-    from wristctl.commands.results import Findings
 
 # Folder of a run with a file for each controller.
 FOLDER = "data/controllers"
@@ -44,7 +43,6 @@ def rig_of(loop: Loop) -> dict[str, Any]:
 def hw_run_fits(study: Study, loop: Loop) -> bool:
     """Whether `hw-run` can have the loop's rig: motors, tendons that its board winds, a camera, and ticks that it can
     follow."""
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import off_both_sides, wound_by
 
     try:
@@ -59,30 +57,6 @@ def hw_run_fits(study: Study, loop: Loop) -> bool:
 def asked_for(reference: Reference) -> dict[str, Any]:
     """A reference as a study file has it."""
     return reference.model_dump(mode="json", exclude_defaults=True)
-
-
-def keep_gains(
-    findings: Findings, file: str, title: str, study: Study, rows: Sequence[Mapping[str, Any]],
-    **sections: Mapping[str, Any],
-) -> None:  # fmt: skip
-    """Write the file of gains into the run, if there is one.
-
-    Parameters
-    ----------
-    findings
-        findings of the run
-    file
-        name of the file in the run
-    title
-        first line
-    study
-        study with the wrist that the gains are for
-    rows
-        controllers with their gains: `simulate` and `hw-run` take the first, `compare` all
-    sections
-        further settings of `simulate`, `compare` and `hw_run`
-    """
-    keep_study(findings, file, title, gains_content(study, rows, **sections))
 
 
 def keep_study(findings: Findings, file: str, title: str, content: Mapping[str, Any]) -> None:

@@ -6,12 +6,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.inputs_of_loops import planes_of_simulation
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.loop import LIVE, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.wrist.directions import DIRECTIONS
 
 if TYPE_CHECKING:
     from wristctl.trial.live_datagrams import LiveReference
@@ -53,11 +55,9 @@ def listened(session: Session) -> Study:
 
     The wall clock paces what is listened for. Raises UserError without a run directory, and where nobody can be heard.
     """
-    from wristctl.commands.inputs_of_loops import planes_of_simulation
     from wristctl.simulation.live_reference import recorded
     from wristctl.trial.live_datagrams import LiveReference
     from wristctl.trial.trial_results import RECORD
-    from wristctl.wrist.directions import DIRECTIONS
 
     study, run = session.study, session.findings.run
     chosen = study.simulate

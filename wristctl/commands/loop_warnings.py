@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import ends_of_family, identified
+from wristctl.commands.inputs_of_loops import ends_of_family, identified, judged_loops
+from wristctl.commands.printed_table import joined
 from wristctl.commands.results import Findings
+from wristctl.commands.study.published import what_changed
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.former_names import preset_today
-from wristctl.config.loop import DirectionName, Loop, Reference, longest_step
+from wristctl.config.loop import DirectionName, Loop, Reference, longest_step, sample_period
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
@@ -22,12 +24,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
-    from wristctl.arrays import Array
     from wristctl.comparison.controller_ranking import Ranking
     from wristctl.control.law import Conditions
     from wristctl.control.shipped_gains import ShippedGains
     from wristctl.simulation.planes import Asked
-    from wristctl.wrist.statics import Shortfall
 
 
 log = logging.getLogger(__name__)
@@ -120,7 +120,6 @@ def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Itera
 
 def warn_of_earlier_families(rows: Iterable[Row | SimulateSettings]) -> None:
     """Warn of shipped gains whose family or simulated drive has changed since they were found, once of each family."""
-    from wristctl.commands.study.published import what_changed
     from wristctl.control.shipped_gains import PREFIX, is_shipped, shipped_gains
     from wristctl.control.table import controller
 
@@ -231,11 +230,8 @@ def out_of_reach(wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[O
 
     shortfalls: dict[tuple[str, str], dict[str, dict[str, None]]] = {}
     for request in asked:
-        short = _shortfall(wrist, request)
-        if (told := _not_held(wrist, request) if short is None else _told(wrist, short)) is not None:
-            motion = reference_name(request.reference) + (
-                f", {request.direction}" if request.direction != "ulnar" else ""
-            )
+        if (told := _not_held(wrist, request)) is not None:
+            motion = reference_name(request.reference) + f", {request.direction}" * (request.direction != "ulnar")
             shortfalls.setdefault(told, {}).setdefault(motion, {})[request.name] = None
     unreachable = []
     for (reason, fix), motions in shortfalls.items():
@@ -255,6 +251,22 @@ def warn_out_of_reach(findings: Findings, wrist: WristParameters, asked: Iterabl
     return unreachable
 
 
+def warn_of_loops(
+    findings: Findings,
+    study: Study,
+    settings: SimulateSettings | TuneSettings | CompareSettings,
+    asked: Iterable[Asked],
+    planes: int = 1,
+) -> list[OutOfReach]:
+    """Warn of loops of a section that buckle or are integrated coarsely, of what is left out of one plane, and of
+    motions out of reach; these are returned."""
+    loops = [settings.loop] if isinstance(settings, SimulateSettings) else list(judged_loops(study, settings).values())
+    warn_if_it_buckles(findings, study.wrist, loops, planes)
+    warn_if_coarse(loops)
+    warn_of_one_plane(study.wrist, asked)
+    return warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
+
+
 def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
     """UserError where gains are to be searched on motions that no gains can hold; a sweep's points are warned of."""
     settings = study.tune
@@ -269,58 +281,33 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
         raise UserError(reason, where, f"{first.fix}; or go on with --force")
 
 
-def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
-    from wristctl.config.loop import sample_period
+def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | None:
+    """The bend that the tendons do not hold, and what helps, in words; tensions without limits hold every bend."""
+    from wristctl.simulation.planes import Asked, motion_in, planes_of
     from wristctl.simulation.reference import by_angles, motion
     from wristctl.simulation.worlds import loop_facing, plant_of
-    from wristctl.wrist.statics import shortfall
-
-    if not asked.loop.limits or _in_space(wrist, asked):
-        return None
-    facing, loop = loop_facing(wrist, asked.loop, asked.direction)
-    theta = motion(by_angles(asked.reference), facing, asked.horizon, sample_period(loop.control_period)).theta_ref
-    low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
-    return shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
-
-
-def _in_space(wrist: WristParameters, asked: AskedMotion) -> bool:
-    from wristctl.simulation.planes import Asked, planes_of
-
-    return planes_of(wrist, [Asked(asked.loop, asked.reference, asked.direction)]) == 2
-
-
-def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | None:
-    """A bend in two planes that the tendons do not hold, and what helps."""
-    from wristctl.config.loop import sample_period
-    from wristctl.simulation.planes import motion_in
-    from wristctl.simulation.reference import by_angles
-
-    if not asked.loop.limits or not _in_space(wrist, asked):
-        return None
-    period = sample_period(asked.loop.control_period)
-    bends = motion_in(2, by_angles(asked.reference), asked.direction, wrist, asked.horizon, period).bend_ref
-    reason = bend_not_held(wrist, asked.loop, bends)
-    return (reason, "a larger tension_limit or tendon_radius, or a smaller angle_deg would do") if reason else None
-
-
-def bend_not_held(wrist: WristParameters, loop: Loop, bends: Array) -> str:
-    """The first of bends (T, 2) [rad] that the tendons of a loop's plant do not hold, in words; empty without one.
-
-    By the statics of one segment; tensions without limits hold every bend.
-    """
-    from wristctl.simulation.worlds import plant_of
     from wristctl.wrist.spatial.held_bends import first_beyond
+    from wristctl.wrist.statics import shortfall
     from wristctl.wrist.tendon_layout import TendonLayout
 
-    beyond = first_beyond(plant_of(wrist, loop.plant), TendonLayout.of(wrist), bends) if loop.limits else None
-    if beyond is None:
-        return ""
-    ulnar, flexion = (math.degrees(bend) for bend in bends[beyond])
-    limit = f"tensions of {wrist.tension_limit:g} N"
-    return f"{limit} do not hold {ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward flexion"
-
-
-def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:
+    if not asked.loop.limits:
+        return None
+    reference, period = by_angles(asked.reference), sample_period(asked.loop.control_period)
+    if planes_of(wrist, [Asked(asked.loop, asked.reference, asked.direction)]) == 2:
+        bends = motion_in(2, reference, asked.direction, wrist, asked.horizon, period).bend_ref
+        beyond = first_beyond(plant_of(wrist, asked.loop.plant), TendonLayout.of(wrist), bends)
+        if beyond is None:
+            return None
+        ulnar, flexion = (math.degrees(bend) for bend in bends[beyond])
+        where = f"{ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward flexion"
+        fix = "a larger tension_limit or tendon_radius, or a smaller angle_deg would do"
+        return f"tensions of {wrist.tension_limit:g} N do not hold {where}", fix
+    facing, loop = loop_facing(wrist, asked.loop, asked.direction)
+    theta = motion(reference, facing, asked.horizon, period).theta_ref
+    low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
+    short = shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
+    if short is None:
+        return None
     reason = (
         f"the tendons cannot hold {math.degrees(short.theta):.3g} deg, which asks for {abs(short.asked):.3g} N m where "
         f"{wrist.tension_limit:g} N give {abs(short.given):.3g}"
@@ -329,7 +316,7 @@ def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:
     if abs(short.angle) > 0.0:  # nan where they do not hold it straight
         way.append(f"at most {_rounded(math.degrees(abs(short.angle)), math.floor):.3g} deg")
     way.append(f"a tendon_radius of {_rounded(short.tendon_radius, math.ceil):.3g} m")
-    return reason, f"{', '.join(way[:-1])} or {way[-1]} would do"
+    return reason, f"{joined(way, 'or')} would do"
 
 
 def _rounded(value: float, way: Callable[[float], int]) -> float:

@@ -31,6 +31,7 @@ from wristctl.records.run_writer import Undrawn
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import read_study
 from wristctl.study_files.strict_yaml import KeyPath
+from wristctl.work.executors import Workers
 
 # Laws that a listing names.
 _NAMED = 2
@@ -60,18 +61,8 @@ def prepare(
 ) -> Prepared[Found]:
     """Open the inputs of a study, and load its laws from elsewhere. Raises UserError.
 
-    Parameters
-    ----------
-    procedure
-        Procedure of the command.
-    study
-        Study to perform.
-    out
-        Folder of the runs.
-    named_inputs
-        Inputs by leaf that come before those of the study.
-    files
-        Files of the study; where one is the configuration of a run, inputs may also be beside that run.
+    `named_inputs` come before those of the study, by leaf, and runs are in the folder `out`; where one of the study's
+    `files` is the configuration of a run, inputs may also be beside that run.
     """
     if procedure.completed is not None:
         study = procedure.completed(study)
@@ -123,20 +114,8 @@ def perform(
 ) -> Found:
     """Perform a prepared study; a failure is noted in `run`, and the tables in the end.
 
-    Parameters
-    ----------
-    prepared
-        Study with open inputs.
-    run
-        Run directory to write; None for a result in memory.
-    show
-        Display of the progress.
-    operator
-        Person at the rig.
-    executor
-        Name of the executor of units of work.
-    typed
-        Files and settings of the study as the command line had them.
+    Without a run the result is in memory only. `typed` are files and settings of the study as the command line had
+    them.
     """
     work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
     if run is not None and run.files:  # what is read is what was sealed
@@ -213,8 +192,6 @@ def in_python() -> Iterator[None]:
 
 def check_executor(named: str) -> None:
     """UserError for what names no executor."""
-    from wristctl.work.executors import Workers
-
     Workers.of(named)
 
 
@@ -231,26 +208,10 @@ def carry_out(
     procedure: Procedure[Found], study: StudyOrFile | None, named_inputs: Mapping[str, Any], out: Folder | None,
     label: str, progress: Watch | None, executor: str = "serial", settings: Mapping[str, Any] = MappingProxyType({}),
 ) -> Found:  # fmt: skip
-    """Plan and perform a procedure.
+    """Plan and perform a procedure on a study, its file, the name of an experiment, or the defaults (None).
 
-    Parameters
-    ----------
-    procedure
-        Procedure of the command.
-    study
-        Study to perform, or its file, or the name of an experiment; None for the defaults.
-    named_inputs
-        Inputs by role.
-    out
-        Folder in which a sealed run is left; None for a result in memory.
-    label
-        Label of the run.
-    progress
-        Callback of the progress; None for no display.
-    executor
-        Name of the executor of units of work.
-    settings
-        Sections of a study, or keys of the command's own, that come after it.
+    `settings` are sections of a study, or keys of the command's own, that come on top of it, and `named_inputs` are by
+    role. `out` is the folder in which a sealed run is left; without one the result is in memory.
     """
     whole, origins = study_with(study, procedure.kind, settings)
     folder, show = Path(RESULTS if out is None else out), watched(progress)

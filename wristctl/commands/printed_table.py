@@ -36,7 +36,8 @@ class Table:
         Columns that do not fit even so go below, the first repeated.
         """
         heads, cells, widths = self._layout(width, digits)
-        right = self._numeric()
+        columns = range(len(self.columns))
+        right = [not any(isinstance(row[index], str | bool) for row in self.rows) for index in columns]
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
             padded = [
@@ -73,7 +74,8 @@ class Table:
 
     def cells(self, digits: int = _DIGITS) -> tuple[list[str], list[list[str]]]:
         """Heads and cells as people read them, numbers to so many digits."""
-        columns, rows = readable(self.columns, [[_plain(value) for value in row] for row in self.rows])
+        plain = [[value.item() if hasattr(value, "item") else value for value in row] for row in self.rows]
+        columns, rows = readable(self.columns, plain)
         angles = [column.endswith("[deg]") for column in columns]
         unit_at = columns.index("unit") if "unit" in columns else None
         cells = []
@@ -82,10 +84,6 @@ class Table:
             values = zip(row, angles, strict=False)
             cells.append([_cell(value, digits, angle or is_angle) for value, angle in values])
         return [printable(column) for column in columns], cells
-
-    def _numeric(self) -> list[bool]:
-        """Which columns hold numbers alone."""
-        return [not any(isinstance(row[index], str | bool) for row in self.rows) for index in range(len(self.columns))]
 
     def _layout(self, width: int | None, digits: int = _DIGITS) -> tuple[list[list[str]], list[list[str]], list[int]]:
         """Lines of each head, text of each cell, and the width of each column."""
@@ -102,10 +100,6 @@ class Table:
 def number(value: float) -> str:
     """Four significant digits; infinities and NaN as a dash."""
     return f"{value:.4g}" if math.isfinite(value) else "-"
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
 
 
 def _cell(value: Any, digits: int, is_angle: bool) -> str:
@@ -148,12 +142,9 @@ def escaped(text: str) -> str:
 COLUMNS = 100
 
 
-def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent: str = "") -> list[str]:
-    """A text in at most so many lines, broken between words; where some is left out a mark says so."""
-    return textwrap.wrap(
-        text, columns, subsequent_indent=indent, max_lines=most, placeholder=" ...",
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+def in_lines(text: str, columns: int = COLUMNS) -> list[str]:
+    """A text in lines, broken between words."""
+    return textwrap.wrap(text, columns, break_long_words=False, break_on_hyphens=False)
 
 
 def joined(words: Sequence[str], last: str = "and") -> str:

@@ -94,7 +94,12 @@ def procedure_of(run: Run) -> Procedure[Any]:
     """Procedure that made a run. Raises UserError for a kind that no command makes."""
     if run.kind_today not in _PLACES:
         raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
-    module, _, name = _PLACES[run.kind_today].partition(":")
+    return procedure_named(run.kind_today)
+
+
+def procedure_named(kind: str) -> Procedure[Any]:
+    """Procedure of a command by its name."""
+    module, _, name = _PLACES[kind].partition(":")
     procedure: Procedure[Any] = getattr(import_module(f"wristctl.commands.{module}"), name)
     return procedure
 

@@ -96,26 +96,10 @@ def counting(
     then: float = 0.0,
     after: float = 0.0,
 ) -> Iterator[Done]:
-    """Count while a block works: each call is shown, and at most one a second is an event.
+    """Count while a block works: each call is shown, and at most one a second is an `event`, as is the end.
 
-    In the end one line of the log names the step and its time; of a step shorter than a second it is a detail.
-
-    Parameters
-    ----------
-    event
-        Function that notes an event; the end is one.
-    task
-        Name of the task.
-    total
-        Length of the task in `unit`; None where it is unknown.
-    unit
-        Unit of the count.
-    show
-        Display of the count.
-    then
-        Time that the command takes after the task, as a multiple of the task's own.
-    after
-        The same in seconds on a machine that does nothing else, of what does not grow with the task.
+    In the end one line of the log names the step and its time; of a step shorter than a second it is a detail. The
+    command takes `then` times the task's own time after it, and `after` [s] on a machine that does nothing else.
     """
     state = Count(task, total, unit, then=then, after=after)
     last_event = state.began - _EVENT_EVERY

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.commands.printed_table import Table, number
+from wristctl.commands.results import Findings
 from wristctl.reader_units import metric_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
-    from wristctl.commands.results import Findings
     from wristctl.identification.arc_fit import Told
 
 # Share of an interval's wider end below which the value within it is printed as 0.

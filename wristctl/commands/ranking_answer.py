@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import degrees, joined, two
-
-if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Fault, Ranking, Traits
+from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits, labels_of
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+from wristctl.control.table import controller
+from wristctl.tuning.objective import YARDSTICK
 
 # Names of gains that the paper prints, and of those with P1 and P2 exchanged: never left out of a label.
 PRINTED = "printed"
@@ -54,7 +54,7 @@ def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
 
     Beside a row that is named alone, as its preset is that of each loop, labels stay whole.
     """
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     if any(map(is_by_loop, labels)):
         return _shortened({label: called(label) for label in labels})
     ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
@@ -78,8 +78,6 @@ def _shortened(names: Mapping[str, str]) -> dict[str, str]:
 
 def gains_words(name: str, gains: Mapping[str, float]) -> str:
     """Gains of a controller with their units: Kp = 4672 N m/rad, Kd = 0.02105 N m s/rad."""
-    from wristctl.control.table import controller
-
     table = controller(name).gains
     return ", ".join(f"{gain} = {value:.4g} {table[gain].unit}".rstrip() for gain, value in gains.items())
 
@@ -91,8 +89,6 @@ def called(label: str) -> str:
 
 def open_loop(label: str) -> bool:
     """Whether a label is of the controller without feedback."""
-    from wristctl.tuning.objective import YARDSTICK
-
     return label.split("/")[0] == YARDSTICK
 
 
@@ -152,16 +148,15 @@ def advice(rankings: Sequence[Ranking]) -> str:
     """Which controller to use: of conditions with motors or a camera, and of ideal ones; of smooth motions, if any."""
     told = []
     for alike in _sides(rankings):
-        where = f"With {_simulated(alike)}" if alike[0].traits.rig else "With exact angles and torques"
+        where = "With exact angles and torques"
+        if alike[0].traits.rig:
+            camera, tendons = (all(getattr(one.traits, part) for one in alike) for part in ("camera", "tendons"))
+            parts = {(True, False): "a simulated camera", (False, True): "simulated motors and tendons"}
+            both = f"simulated motors, tendons {'and' if camera else 'or'} a camera"
+            where = f"With {parts.get((camera, tendons), both)}"
         where = f"For steps {where[0].lower()}{where[1:]}" if alike[0].jumps else where
         told.append(_use(where, alike, [ranking for ranking in rankings if ranking not in alike]))
     return " ".join(told)
-
-
-def _simulated(alike: Sequence[Ranking]) -> str:
-    every = [all(getattr(one.traits, part) for one in alike) for part in ("camera", "tendons")]
-    words = {(True, False): "a simulated camera", (False, True): "simulated motors and tendons"}
-    return words.get((every[0], every[1]), f"simulated motors, tendons {'and' if every[0] else 'or'} a camera")
 
 
 def recommended(rankings: Sequence[Ranking]) -> list[str]:
@@ -183,7 +178,7 @@ def _chosen(alike: Sequence[Ranking]) -> str | None:
     firsts = {ranking.labels[row] for ranking in alike if (row := winner(ranking, alike)) is not None}
 
     def mean(label: str) -> float:
-        return sum(math.log(one.means[one.labels.index(label)].value) for one in alike if label in one.labels)
+        return sum(math.log(one.of_label(label).value) for one in alike if label in one.labels)
 
     return max(sorted(firsts), key=lambda label: (often[label], -mean(label)), default=None)
 
@@ -205,7 +200,7 @@ def _errors(best: Sequence[Ranking], label: str) -> str:
     if len(best) == 1:
         text = with_interval(best[0], best[0].labels.index(label))
         return text.replace(" [", " deg [") if "[" in text else f"{text} deg"
-    means = sorted(ranking.means[ranking.labels.index(label)].value for ranking in best)
+    means = sorted(ranking.of_label(label).value for ranking in best)
     least, most = degrees(means[0], DIGITS), degrees(means[-1], DIGITS)
     return f"{least} deg" if least == most else f"{least} to {most} deg"
 
@@ -215,7 +210,7 @@ def _than_the_next(best: Sequence[Ranking], label: str) -> str:
     if any(len(ranking.standing.groups) < 2 for ranking in best):
         return ""
     nexts = [ranking.standing.groups[1][0] for ranking in best]
-    own = [ranking.means[ranking.labels.index(label)].value for ranking in best]
+    own = [ranking.of_label(label).value for ranking in best]
     ratios = [one.means[row].value / mean for one, row, mean in zip(best, nexts, own, strict=True)]
     place = min(range(len(best)), key=lambda number: ratios[number])
     bound = "more than " if degrees(own[place]).startswith("<") else "at least " * (len(best) > 1)
@@ -270,8 +265,6 @@ def _counted(places: Sequence[str]) -> str:
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:
-    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
-
     few = [ranking for ranking in alike if ranking.standing.untold]
     if not few:
         return "use none of these: each fails, swings, chatters or does not arrive"
@@ -313,8 +306,6 @@ def decided(rankings: Sequence[Ranking]) -> str:
 
     Where none can be used it is told of the one with the least error.
     """
-    from wristctl.comparison.controller_ranking import MOTORS_DECIDE
-
     shares, motors = list[str](), list[str]()
     known = [ranking for ranking in rankings if ranking.at_limit]
     for ranking in known:

@@ -1,9 +1,12 @@
-"""Rankings as tables: the answer's, every row of a ranking over worlds, and which controller for which rig."""
+"""Rankings as tables and figures: the answer's, every row over worlds, and which controller for which rig."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
 from wristctl.commands.ranking_answer import (
@@ -17,11 +20,10 @@ from wristctl.commands.ranking_answer import (
     winner,
     with_interval,
 )
-
-if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Ranking
-    from wristctl.comparison.step_cost import StepTime
-    from wristctl.comparison.world_ranking import WorldRanking
+from wristctl.commands.results import Findings
+from wristctl.comparison.controller_ranking import Ranking, labels_of, undominated
+from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.world_ranking import WorldRanking
 
 # Controllers that a table on the screen has, at most, unless more were asked for.
 _DOZEN = 12
@@ -50,7 +52,7 @@ def controllers_table(
     then those that tie, as far as there is room. Where that is no short table, and does not fit beside each other in so
     many lines, first intervals go, then steps where there are other motions, then controllers.
     """
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     best = [ranking.labels[row] for ranking in rankings if (row := winner(ranking, rankings)) is not None]
     tied = [label for ranking in rankings for label in first_group(ranking)]
     order = list(dict.fromkeys([*recommended(rankings), *asked, *best, *tied, *labels]))
@@ -101,7 +103,7 @@ def _of_controllers(
 
 def standings_table(rankings: Sequence[Ranking]) -> Table:
     """A controller a line: its rank and RMSE under each condition, or what is wrong with it there."""
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
 
     def cell(ranking: Ranking, label: str) -> str:
         if label not in ranking.labels:
@@ -122,10 +124,6 @@ def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None
 
     `times` are those of a tick, by controller or by row.
     """
-    import numpy as np
-
-    from wristctl.comparison.controller_ranking import undominated
-
     energy, chattering = ranking.medians("energy"), ranking.medians("chattering")
     rmse = np.array([estimate.value for estimate in ranking.means])
     front = undominated(np.column_stack([rmse, chattering, energy]))
@@ -197,3 +195,55 @@ def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str
         following = f"{names[ranking.labels[after]]} {two(ratio, DIGITS)}"
     equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
     return names[ranking.labels[row]], with_interval(ranking, row), equal, following
+
+
+def draw_rankings(findings: Findings, rankings: Sequence[Ranking], later: bool = False) -> None:
+    """Draw the answer, performance profiles, ratios to feedforward, and who beats whom under each condition.
+
+    All but the answer are drawn when somebody asks for them, where `later`; who beats whom always is.
+    """
+    from wristctl.plotting.ranking_figures import (
+        answer_figure,
+        paired_ratios,
+        performance_profile,
+        probability_of_better,
+    )
+
+    if not rankings:
+        return
+    places = {ranking.name: condition(ranking) for ranking in rankings}
+    caption = "RMSE of every controller under each condition, the best on top; black crosses must not be used"
+    findings.figure("answer", answer_figure, rankings, places_of(rankings), caption=caption)
+    findings.overview.figure = "answer"
+    unit = rankings[0].unit
+    caption = f"Share of the {unit}s in which a controller's RMSE is within a factor of the least one there"
+    findings.figure("performance-profile", performance_profile, rankings, places, caption=caption, later=later)
+    baseline = next((one.labels[one.yardstick] for one in rankings if one.yardstick is not None), None)
+    if baseline is not None and any(len(one.labels) > 1 for one in rankings):
+        caption = f"RMSE over feedforward's in the same {unit}s: geometric mean with 95 % interval, and every {unit}"
+        findings.figure("ratio-to-feedforward", paired_ratios, rankings, baseline, places, caption=caption, later=later)
+    for ranking in rankings:
+        name, place = re.sub(r"[^A-Za-z0-9.-]+", "-", ranking.name), places[ranking.name]
+        caption = f"Probability that a controller (row) has less RMSE than another (column) in a {unit}: {place}"
+        findings.figure(f"probability-{name}", probability_of_better, ranking, place, caption=caption, later=True)
+
+
+def keep_error(findings: Findings, name: str, ranking: Ranking, row: int, meaning: str = "") -> None:
+    """Keep the geometric mean of a row's RMSE, with its interval if it has one, as a metric."""
+    mean = ranking.means[row]
+    ends = (mean.low, mean.high) if math.isfinite(mean.high) else None
+    findings.metric(name, mean.value, "rad", "lower", ranking.count, ends, meaning)
+
+
+def draw_intervals(findings: Findings, ranking: WorldRanking, end: str) -> None:
+    """Draw every row of a ranking over worlds with its interval; `end` follows `ranking` in the figure's name."""
+    from wristctl.plotting.ranking_figures import ranking_intervals
+
+    caption = f"RMSE of every controller on {ranking.name}, with 95 % intervals over worlds"
+    findings.figure(f"ranking{end}", ranking_intervals, ranking, caption=caption)
+
+
+def places_of(rankings: Sequence[Ranking]) -> dict[str, str]:
+    """Words of each condition, by the name of its ranking, with its best controller in a second line."""
+    best = {one.name: one.labels[row] for one in rankings if (row := winner(one, rankings)) is not None}
+    return {one.name: condition(one) + (f"\nbest: {best[one.name]}" if one.name in best else "") for one in rankings}

@@ -38,11 +38,6 @@ _log = logging.getLogger(__name__)
 _FURTHER = "further figures"
 
 
-def _subject(draw: Callable[..., Figure]) -> str:
-    """First line of a function's docstring, without its full stop; empty where there is none."""
-    return (draw.__doc__ or "").partition("\n")[0].removesuffix(".")
-
-
 class Metrics(dict[str, float]):
     """Numbers by name. An unknown name is a KeyError that says which is meant."""
 
@@ -118,25 +113,7 @@ class Findings:
         interval: tuple[float, float] | None = None,
         meaning: str = "",
     ) -> None:
-        """Record a metric.
-
-        Parameters
-        ----------
-        name
-            Name of the metric.
-        value
-            Value in `unit`; None where there is none.
-        unit
-            Unit; empty for a ratio.
-        better
-            Better direction; empty where there is none.
-        n
-            Sample size.
-        interval
-            Ends of the 95 % interval, in `unit`.
-        meaning
-            Meaning in words.
-        """
+        """Record a metric: its value in `unit`, None where there is none, of `n` samples, with its 95 % interval."""
         entry = {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
         self.metrics[name] = entry
         if self.run:
@@ -145,26 +122,13 @@ class Findings:
     def figure(
         self, name: str, draw: Callable[..., Figure], *of: Any, caption: str = "", later: bool = False, **options: Any
     ) -> None:
-        """Record a figure: drawn now into a run, else when somebody asks for it.
+        """Record a figure that `draw` makes of these arguments: drawn now into a run, else when somebody asks for it.
 
-        Parameters
-        ----------
-        name
-            Name of the figure's file.
-        draw
-            Function that draws it.
-        of
-            Arguments of `draw`.
-        caption
-            Subject of the figure; without one it is the first line of `draw`'s docstring.
-        later
-            Whether it is drawn only when somebody asks for it, also with a run.
-        options
-            Keyword arguments of `draw`.
+        Its caption is the first line of `draw`'s docstring where none is given. With `later` it waits with a run too.
         """
         drawer = partial(draw, *of, **options)
         self.figures.add(name, drawer)
-        self.overview.captions[name] = caption or _subject(draw)
+        self.overview.captions[name] = caption or (draw.__doc__ or "").partition("\n")[0].removesuffix(".")
         if self.run and self._draws and not later:
             self.run.figure(name, drawer)
 

@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
-    from wristctl.commands.answer import Answer
-    from wristctl.commands.printed_table import Table
     from wristctl.trial.control_loop import Shown
     from wristctl.trial.supervised_wait import Meanwhile
     from wristctl.trial.trials import Trial
@@ -110,13 +110,7 @@ class Unattended:
         """Raises UserError."""
         raise UserError(f"nobody is there to agree to this: {action}", fix="use the command line", exit_code=3)
 
-    def dare(self, action: str) -> None:
-        """Raises UserError."""
-        self.confirm(action)
-
-    def wait_for(self, action: str) -> None:
-        """Raises UserError."""
-        self.confirm(action)
+    dare = wait_for = confirm
 
     @contextmanager
     def watch(self, trials: Sequence[Trial], session: Session) -> Iterator[Shown]:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
-
-if TYPE_CHECKING:
-    from wristctl.config.loop import Loop
-    from wristctl.config.wrist import WristParameters
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
 
 
 def stiffness_table(wrist: WristParameters, loop: Loop, planes: int) -> Table:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from wristctl.commands.adoption import adoption, sources_in
 from wristctl.commands.session import Session
-
-if TYPE_CHECKING:
-    from wristctl.work.fan_out import UnitsDone
-    from wristctl.work.worker import Golden, Unit
-
+from wristctl.work.executors import Workers
+from wristctl.work.fan_out import UnitsDone, perform_units
+from wristctl.work.worker import UNITS, Computed, Furnish, Golden, Unit, code_digest
 
 log = logging.getLogger(__name__)
 
@@ -29,30 +27,9 @@ def performed(
 ) -> UnitsDone:
     """Compute a command's units with the session's workers, into the run where there is one, and show the progress.
 
-    The hashes of laws from elsewhere are part of the units' specifications.
-
-    Parameters
-    ----------
-    session
-        Session of the study.
-    command
-        Name of the command.
-    task
-        Name of the task in the display of the progress.
-    units
-        Units of work.
-    golden
-        Numbers that all workers must reproduce; None for no check.
-    counted
-        Unit of the units' sizes.
-    then, after
-        Time that the command takes after them, as `Session.progress` has it.
+    All workers must reproduce the `golden` numbers. The hashes of laws from elsewhere are part of the units'
+    specifications. What the units' sizes are of is `counted`; `then` and `after` are those of `Session.progress`.
     """
-    from wristctl.commands.adoption import adoption, sources_in
-    from wristctl.work.executors import Workers
-    from wristctl.work.fan_out import perform_units
-    from wristctl.work.worker import UNITS, Computed, Furnish, code_digest
-
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
     folder, earlier = (source.path / UNITS if source else None for source in (run, stopped))
     first = folder is None or not folder.exists()

@@ -7,7 +7,7 @@ the integration step never counts.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -114,7 +114,7 @@ def search(
     for generation in range(generations):
         points = optimiser.ask()
         settings = [_at(fixed, wrist, names, point, island) for point in points]
-        factors, numbers, read = closest(_courses(row, settings), row.controller, reading)
+        factors, numbers, read = closest(courses(row, settings), row.controller, reading)
         hopeful = np.flatnonzero(factors < min(_HOPEFUL, best[0]))  # only the best must be honest
         if len(hopeful):
             honest = follows(row, [settings[candidate] for candidate in hopeful])
@@ -127,16 +127,15 @@ def search(
         if progress is not None:
             progress((generation + 1) / generations)
     factor, ours, read_as, point = best
-    rollouts, rmse, settling, steady = generations * candidates, *(float(number) for number in ours)
+    rmse, settling, steady = (float(number) for number in ours)
+    found = BestCase(
+        row.label, reading, *island, seed, factor, (rmse, settling, steady), read_as, None, generations * candidates,
+        stopped, 0.0,
+    )  # fmt: skip
     if not np.isfinite(factor):
-        return BestCase(
-            row.label, reading, *island, seed, factor, (rmse, settling, steady), "", None, rollouts, stopped, 0.0
-        )
+        return found
     setting = _at(fixed, wrist, names, point, island)
-    near = _near(fixed, wrist, row, reading, setting, rng)
-    return BestCase(
-        row.label, reading, *island, seed, factor, (rmse, settling, steady), read_as, setting, rollouts, stopped, near
-    )
+    return replace(found, setting=setting, near=_near(fixed, wrist, row, reading, setting, rng))
 
 
 def _at(
@@ -145,10 +144,6 @@ def _at(
     drawn = box.setting(wrist, dict(zip(names, np.minimum(point, 1.0 - 1e-12).tolist(), strict=True)))
     loop = drawn.loop.model_copy(update={"plant_segments": island[0], "control_period": island[1]})
     return drawn._replace(loop=loop)
-
-
-def _courses(row: Row, settings: Sequence[PaperSetting]) -> Courses:
-    return courses(row, settings, [setting.reference for setting in settings])
 
 
 def _near(
@@ -167,7 +162,7 @@ def _near(
                 wrist=parameters.model_copy(update=changed), reference=motion.model_copy(update={"duration": duration})
             )
         )
-    factors, _, _ = closest(_courses(row, moved), row.controller, reading)
+    factors, _, _ = closest(courses(row, moved), row.controller, reading)
     return float((factors < FACTOR).mean())
 
 

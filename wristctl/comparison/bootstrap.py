@@ -80,17 +80,14 @@ class Resampled:
             return np.stack([np.full(len(self.means), -np.inf), np.full(len(self.means), np.inf)])
         interval = np.stack([self.means, self.means])
         if self._varied.any():
-            interval[:, self._varied] = self._bca(_widened(level, self._rows.shape[1]))
+            from scipy.stats import bootstrap
+
+            resampled: Any = bootstrap(
+                (self._rows[self._varied],), np.mean, axis=-1, batch=_AT_ONCE, method="BCa", n_resamples=_RESAMPLES,
+                confidence_level=_widened(level, self._rows.shape[1]), rng=np.random.default_rng(self._seed),
+            )  # fmt: skip
+            interval[:, self._varied] = np.stack(resampled.confidence_interval)
         return interval
-
-    def _bca(self, level: float) -> Array:
-        from scipy.stats import bootstrap
-
-        resampled: Any = bootstrap(
-            (self._rows[self._varied],), np.mean, axis=-1, batch=_AT_ONCE, confidence_level=level, method="BCa",
-            n_resamples=_RESAMPLES, rng=np.random.default_rng(self._seed),
-        )  # fmt: skip
-        return np.stack(resampled.confidence_interval)
 
     def estimates(self, level: float = LEVEL) -> list[GeometricMean]:
         """Geometric mean of each row with its interval."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,6 +18,7 @@ from wristctl.config.former_names import column_of_loop
 from wristctl.config.loop import LOOPS, Reference
 from wristctl.config.study import Study
 from wristctl.simulation.arrival import SHORT
+from wristctl.simulation.metrics import METRICS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,10 +66,13 @@ def conditions_of(claims: Sequence[Claim]) -> list[LoopCondition]:
 
 def rows_of(claims: Sequence[Claim], scale: float) -> list[Row]:
     """The controllers with their gains that the claims ask for, each once."""
-    asked = [claim for claim in claims if claim.evidence in _BY_LOOPS and scale in (NOMINAL, claim.stiffness_scale)]
-    labels = dict.fromkeys(label for claim in asked for label in (claim.label, claim.than) if label)
-    pairs = [label.split("/") for label in labels]
-    return [Row(controller=name, gains=gains) for name, gains in pairs]
+    return rows_asked(c for c in claims if c.evidence in _BY_LOOPS and scale in (NOMINAL, c.stiffness_scale))
+
+
+def rows_asked(claims: Iterable[Claim]) -> list[Row]:
+    """The rows that claims speak of, each once."""
+    labels = dict.fromkeys(label for claim in claims for label in (claim.label, claim.than) if label)
+    return [Row(controller=name, gains=gains) for name, gains in (label.split("/") for label in labels)]
 
 
 def evidence_study(study: Study, claims: Sequence[Claim], condition: LoopCondition) -> Study:
@@ -112,16 +116,10 @@ class Judgement:
     @property
     def reason(self) -> str:
         """Why, over all loops."""
-        by_loop = [
-            f"{name}: {finding.reason}" if name else finding.reason
-            for name, finding in self.found.items()
-            if finding.reason
-        ]
-        differ = (
-            len({finding.verdict for finding in self.found.values()}) > 1 and self.verdict == "not specified enough"
-        )
-        parts = ("the loop decides" if differ else "", self.claim.unspecified, self.claim.reason, *by_loop)
-        return "; ".join(part for part in parts if part)
+        by_loop = [(f"{name}: " if name else "") + each.reason for name, each in self.found.items() if each.reason]
+        verdicts = {finding.verdict for finding in self.found.values()}
+        differ = len(verdicts) > 1 and self.verdict == "not specified enough"
+        return _all("the loop decides" * differ, self.claim.unspecified, self.claim.reason, *by_loop)
 
 
 def judge_all(claims: Sequence[Claim], shown: Grounds) -> list[Judgement]:
@@ -191,9 +189,7 @@ def _judgement(claim: Claim, findings: Mapping[str, Finding], *shown_by: str) ->
             name: finding._replace(
                 verdict="not specified enough",
                 beside=finding.verdict,
-                reason="; ".join(
-                    part for part in (f"{choice} {worded(claim, finding.verdict)}", finding.reason) if part
-                ),
+                reason=_all(f"{choice} {worded(claim, finding.verdict)}", finding.reason),
             )
             for name, finding in findings.items()
         }
@@ -217,7 +213,8 @@ def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
         before = _moves(shown.loops[loop, NOMINAL], claim.label)[metric].to_numpy(float)
         finding = _explained(of_numbers(printed(claim), np.maximum(ours - before, 0.0)))
     elif metric == "settling_after":
-        finding = of_settling(printed(claim), ours, _durations(moves))
+        durations = [float(label.split()[2]) for label in moves["reference"]]  # of minimum-jerk motions [s]
+        finding = of_settling(printed(claim), ours, durations)
     else:
         finding = of_numbers(printed(claim), ours, claim.sense)
     if claim.derived and loop == DERIVED_ON and finding.verdict in ("worse than the paper", "does not hold"):
@@ -226,11 +223,12 @@ def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
         "not physical": _unphysical(table, (claim.label, claim.than), shown.tension_limit),
         "not converged": _unconverged((moves, than_moves)),
     }
-    reasons = [finding.reason, *marks.values()]
-    return finding._replace(
-        mark=", ".join(mark for mark, reason in marks.items() if reason),
-        reason="; ".join(reason for reason in reasons if reason),
-    )
+    mark = ", ".join(mark for mark, reason in marks.items() if reason)
+    return finding._replace(mark=mark, reason=_all(finding.reason, *marks.values()))
+
+
+def _all(*reasons: str) -> str:
+    return "; ".join(filter(None, reasons))
 
 
 def _unphysical(table: pd.DataFrame, labels: Sequence[str | None], limit: float) -> str:
@@ -256,19 +254,8 @@ def _moves(table: pd.DataFrame, label: str) -> pd.DataFrame:
     moves = selected[~selected["reference"].str.startswith("step")]
     if "failed" not in moves:
         return moves
-    metrics = [column for column in moves.columns if column in _of_error()]
+    metrics = [column for column in moves.columns if column in METRICS and METRICS[column].of_error]
     return moves.assign(**{column: moves[column].mask(moves["failed"]) for column in metrics})
-
-
-def _of_error() -> set[str]:
-    from wristctl.simulation.metrics import METRICS
-
-    return {name for name, metric in METRICS.items() if metric.of_error}
-
-
-def _durations(moves: pd.DataFrame) -> list[float]:
-    """Durations of minimum-jerk motions, by their names [s]."""
-    return [float(label.split()[2]) for label in moves["reference"]]
 
 
 def printed(claim: Claim) -> Ends:
@@ -305,7 +292,7 @@ def _by_training(claim: Claim, metrics: Metrics | None) -> Finding:
     ends = metric.get("interval")
     finding = of_sample(printed(claim), middle, tuple(ends) if ends else None, claim.sense)
     measured = f"{claim.metric} is {middle:.3g}" + (f" (n = {metric['n']})" if metric.get("n") else "")
-    return finding._replace(reason="; ".join(part for part in (finding.reason, measured) if part))
+    return finding._replace(reason=_all(finding.reason, measured))
 
 
 def _by_trials(claim: Claim, trials_done: TrialsDone | None) -> Finding:
@@ -318,9 +305,8 @@ def _by_trials(claim: Claim, trials_done: TrialsDone | None) -> Finding:
     if claim.direction is not None:
         selected = selected[selected["direction"] == claim.direction]
     if selected.empty:
-        where = (
-            f" {'pushed ' * claim.pushed}toward {claim.direction}" if claim.direction else " with a push" * claim.pushed
-        )
+        toward = f" {'pushed ' * claim.pushed}toward {claim.direction}"
+        where = toward if claim.direction else " with a push" * claim.pushed
         return Finding("open", reason=f"no trial of the paper's law{where} in this run")
     values = selected[str(claim.metric)].to_numpy(float)
     if claim.metric == "settling_after":
@@ -330,9 +316,7 @@ def _by_trials(claim: Claim, trials_done: TrialsDone | None) -> Finding:
     rig = "an emulated rig" if trials_done.emulated else "a rig"
     gains = ", ".join(f"smc/{preset}" for preset in dict.fromkeys(selected["gains"]))
     measured = f"mean of {len(selected)} trials of {gains} on {rig}"
-    return finding._replace(
-        reason="; ".join(part for part in (measured, finding.reason) if part), mark="emulated" * trials_done.emulated
-    )
+    return finding._replace(reason=_all(measured, finding.reason), mark="emulated" * trials_done.emulated)
 
 
 def interval(low: float, high: float) -> str:
@@ -361,12 +345,8 @@ def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
         }
         for name in loops or [""]:
             finding = j.found.get(name) or j.found.get("")
-            column = column_of_loop(name)
-            row |= {
-                f"{column}_verdict".strip("_"): finding.verdict if finding else "",
-                "_".join(part for part in (column, "low") if part): finding.low if finding else np.nan,
-                "_".join(part for part in (column, "high") if part): finding.high if finding else np.nan,
-                "_".join(part for part in (column, "mark") if part): finding.mark if finding else "",
-            }
+            shown = finding._asdict() if finding else {"verdict": "", "low": np.nan, "high": np.nan, "mark": ""}
+            begin = f"{column_of_loop(name)}_" if name else ""
+            row |= {f"{begin}{key}": shown[key] for key in ("verdict", "low", "high", "mark")}
         rows.append(row | {"shown_by": ", ".join(j.shown_by), "reason": j.reason})
     return pd.DataFrame(rows)

@@ -101,7 +101,12 @@ def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
     for name, loop in chosen.loops.items():
         for direction in chosen.directions:
             wrist, own = (study.wrist, loop) if planes == 2 else loop_facing(study.wrist, loop, direction)
-            courses = _courses(study, planes, wrist, direction, sample_period(loop.control_period), network)
+            period, courses = sample_period(loop.control_period), []
+            for reference, inverse in product(chosen.references, chosen.inverses):
+                inverted = reference.model_copy(update={"inverse": inverse})
+                motion = motion_in(planes, inverted, direction, wrist, chosen.horizon, period, network)
+                names = course_name(reference, direction, chosen), inverse, scenario_of(reference, direction)
+                courses.append(ReferenceCourse(*names, motion, jumps(reference)))
             conditions.append(Condition(name, own, wrist, courses))
     return conditions
 
@@ -122,6 +127,11 @@ def count_rollouts(chosen: CompareSettings) -> int:
     )
 
 
+def within(progress: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None]:
+    """Progress of a part that takes a task from one share of it to another."""
+    return lambda share: None if progress is None else progress(begin + share * (end - begin))
+
+
 def compare(
     study: Study,
     network: Inverse | None = None,
@@ -139,8 +149,8 @@ def compare(
     }
     names = list(dict.fromkeys(row.controller for row in chosen.rows))
     conditions = planned(study, network)
-    repetitions_of = [controller(name).learning for name in names]
-    before = [sum(repetitions_of[:number]) / sum(repetitions_of) for number in range(len(names) + 1)]
+    learning = [controller(name).learning for name in names]
+    before = [sum(learning[:number]) / sum(learning) for number in range(len(names) + 1)]
     results: list[ComparedRow] = []
     for part, condition in enumerate(conditions):
         courses, motions = condition.courses, [each.motion for each in condition.courses]
@@ -153,15 +163,10 @@ def compare(
                 len(rows) * len(courses), -1
             )
             which = np.tile(np.arange(len(courses)), len(rows))
-            base = part + before[number]
-
-            def report(share: float, base: float = base, number: int = number) -> None:
-                if progress is not None:
-                    progress((base + share * (before[number + 1] - before[number])) / len(conditions))
-
+            begin, end = ((part + share) / len(conditions) for share in before[number : number + 2])
             repetitions = repeat(
                 controller(name), batch, motions, which, condition.loop, condition.wrist, scenarios, draws,
-                chosen.repetitions, progress=report,
+                chosen.repetitions, progress=within(progress, begin, end),
             )  # fmt: skip
             for index, repeated in enumerate(repetitions):
                 row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]
@@ -169,20 +174,6 @@ def compare(
                 combination = (condition.name, course.reference, course.inverse, name, row.gains_name)
                 results.append(ComparedRow(*combination, labelled, course.jumps))
     return _in_order(results, chosen)
-
-
-def _courses(
-    study: Study, planes: int, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
-) -> list[ReferenceCourse]:
-    chosen = study.compare
-    reference_courses: list[ReferenceCourse] = []
-    for reference in chosen.references:
-        for inverse in chosen.inverses:
-            inverted = reference.model_copy(update={"inverse": inverse})
-            name, scenario = course_name(reference, direction, chosen), scenario_of(reference, direction)
-            course = motion_in(planes, inverted, direction, wrist, chosen.horizon, period, network)
-            reference_courses.append(ReferenceCourse(name, inverse, scenario, course, jumps(reference)))
-    return reference_courses
 
 
 def course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
@@ -238,7 +229,7 @@ def class_of(loop: Loop, wrist: WristParameters) -> str:
 
 
 # Wrist parameters that the paper prints. Those that it does not print (C10) are free.
-_PRINTED = ("discs", "springs", "tendons", "stiffness", "damping")
+_PRINTED = ("discs", "tendons", "stiffness", "damping")
 _MOVE_DEG = 30.0
 
 
@@ -248,19 +239,10 @@ def paper_cells(study: Study) -> frozenset[tuple[str, str]]:
     A push, a payload, softer springs, motors or a camera are no part of it, nor is a motion that never rests.
     """
     chosen = study.compare
-    if any(_differs(study.wrist, name) for name in _PRINTED):
+    fields = WristParameters.model_fields
+    if any(getattr(study.wrist, name) != fields[name].default for name in _PRINTED) or "ulnar" not in chosen.directions:
         return frozenset()
     loops = [name for name, loop in chosen.loops.items() if class_of(loop, study.wrist) in ("ideal", "sampled")]
-    moves = [reference for reference in chosen.references if _papers_move(reference)]
-    names = [course_name(reference, "ulnar", chosen) for reference in moves if "ulnar" in chosen.directions]
-    return frozenset((loop, name) for loop in loops for name in names)
-
-
-def _differs(wrist: WristParameters, name: str) -> bool:
-    field = WristParameters.model_fields.get(name)
-    return field is not None and getattr(wrist, name) != field.default
-
-
-def _papers_move(reference: Reference) -> bool:
-    single = reference.kind in ("step", "minimum-jerk") and reference.tip is None
-    return single and abs(reference.end_deg - _MOVE_DEG) < 1e-9
+    single = [each for each in chosen.references if each.kind in ("step", "minimum-jerk") and each.tip is None]
+    moves = [each for each in single if abs(each.end_deg - _MOVE_DEG) < 1e-9]
+    return frozenset(product(loops, (course_name(reference, "ulnar", chosen) for reference in moves)))

@@ -6,7 +6,7 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -172,6 +172,10 @@ class Ranking:
         """The best row of a controller; None where it has none."""
         return next((row for row in self.standing.order if self.labels[row].split("/")[0] == controller), None)
 
+    def of_label(self, label: str) -> GeometricMean:
+        """Geometric mean of the RMSE [rad] of the row with a label."""
+        return self.means[self.labels.index(label)]
+
     def times_better(self, row: int, reference_row: int) -> GeometricMean:
         """Ratio of a reference row's RMSE to another row's on the same cases."""
         penalised_scores = penalised(self.scores)
@@ -180,6 +184,17 @@ class Ranking:
     def of(self, results: Sequence[ComparedRow]) -> list[ComparedRow]:
         """Results of a comparison under this condition with its kind of motion."""
         return [result for result in results if result.loop in self.loops and result.jumps == self.jumps]
+
+    def line(self, row: int) -> dict[str, object]:
+        """A row's label, group, fate and mean [rad] with its interval, as tables begin with them."""
+        stands, mean = self.standing, self.means[row]
+        names = {"row": self.labels[row], "group": stands.group(row), "fate": stands.fate(row)}
+        return names | {"rmse": mean.value, "rmse_low": mean.low, "rmse_high": mean.high}
+
+
+def labels_of(rankings: Iterable[Ranking]) -> list[str]:
+    """Labels of the rows of all rankings, each once."""
+    return list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
 
 
 def probability_of_less(scores: Array) -> Array:
@@ -265,11 +280,7 @@ def _ranked(name: str, results: Sequence[ComparedRow], loops: Sequence[str], tra
         motions=len(cells),
         traits=traits,
         loops=loops,
-        at_limit={
-            limit: np.array([np.mean([cell.metrics[metric].mean() for cell in row]) for row in table])
-            for limit, metric in LIMITS.items()
-            if all(metric in cell.metrics for row in table for cell in row)
-        },
+        at_limit=time_at_limits([[cell.metrics for cell in row] for row in table]),
     )
 
 
@@ -291,6 +302,15 @@ def _chatter(repeated: Repeated) -> Array:
     return chatter(variation, repeated.tension_range, repeated.first.trajectory.tension.shape[1])
 
 
+def time_at_limits(rows: Sequence[Sequence[Mapping[str, Array]]]) -> dict[str, Array]:
+    """Mean share of time that each row was at a limit, by LIMITS, (R,) each, of its cases' metrics; none if unknown."""
+    return {
+        limit: np.array([np.mean([metrics[name].mean() for metrics in row]) for row in rows])
+        for limit, name in LIMITS.items()
+        if all(name in metrics for row in rows for metrics in row)
+    }
+
+
 def counted(flags: dict[str, NDArray[np.bool_]], scores: Array) -> dict[str, NDArray[np.int_]]:
     """Number of cases (R,) in which a flag (R, W) holds and the row does not fail."""
     return {name: (holds & np.isfinite(scores)).sum(axis=1) for name, holds in flags.items()}
@@ -307,16 +327,11 @@ def standings_frame(rankings: Sequence[Ranking]) -> pd.DataFrame:
     for ranking in rankings:
         stands = ranking.standing
         for row in stands.order:
-            mean, lost = ranking.means[row], stands.lost[row]
+            lost = stands.lost[row]
             lines.append(
-                {
-                    "class": ranking.name,
-                    "row": ranking.labels[row],
-                    "group": stands.group(row),
-                    "fate": stands.fate(row),
-                    "rmse": mean.value,
-                    "rmse_low": mean.low,
-                    "rmse_high": mean.high,
+                {"class": ranking.name}
+                | ranking.line(row)
+                | {
                     "pairs": lost.n,
                     "fails": stands.failures[row].times,
                     "swings": stands.swings[row].times,

@@ -7,7 +7,7 @@ Appl. Stat. 1 (2007) 386; nested levels: Davison and Hinkley, Bootstrap Methods,
 """
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
 
@@ -141,29 +141,16 @@ class Firsts(NamedTuple):
     of_tunings: int
 
 
-class Order:
-    """Which of R rows of logarithms (R, T, W, S) are first in random halves of the worlds, and in single tunings."""
-
-    def __init__(self, logarithms: Array, rows: Sequence[int], seed: int | Entropy) -> None:
-        self._logarithms, self._rows, self._seed = logarithms[list(rows)].mean(axis=3), list(rows), seed
-
-    def firsts(self, row: int) -> Firsts:
-        """How often a row is first."""
-        return Firsts(
-            int(np.sum(self._by_halves == row)), int(np.sum(self._by_tunings == row)), self._logarithms.shape[1]
-        )
-
-    @cached_property
-    def _by_halves(self) -> NDArray[np.int_]:
-        rng, of_worlds = np.random.default_rng(self._seed), self._logarithms.mean(axis=1)
-        worlds = of_worlds.shape[1]
-        halves = [rng.permutation(worlds)[: max(1, worlds // 2)] for _ in range(HALVES)]
-        return np.array([self._rows[int(np.argmin(of_worlds[:, half].mean(axis=1)))] for half in halves])
-
-    @cached_property
-    def _by_tunings(self) -> NDArray[np.int_]:
-        first: NDArray[np.int_] = np.array(self._rows)[np.argmin(self._logarithms.mean(axis=2), axis=0)]
-        return first
+def firsts(logarithms: Array, rows: Sequence[int], seed: int | Entropy) -> dict[int, Firsts]:
+    """How often each of some rows of logarithms (R, T, W, S) is first: in halves of the worlds, and in tunings."""
+    of_rows, rng = logarithms[list(rows)].mean(axis=3), np.random.default_rng(seed)
+    of_worlds, worlds = of_rows.mean(axis=1), of_rows.shape[2]
+    halves = [rng.permutation(worlds)[: max(1, worlds // 2)] for _ in range(HALVES)]
+    by_halves = [int(np.argmin(of_worlds[:, half].mean(axis=1))) for half in halves]
+    by_tunings = np.argmin(of_rows.mean(axis=2), axis=0).tolist()
+    return {
+        row: Firsts(by_halves.count(place), by_tunings.count(place), len(by_tunings)) for place, row in enumerate(rows)
+    }
 
 
 def median_tuning(errors: Sequence[float]) -> int:

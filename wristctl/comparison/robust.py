@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.claims import printed
+from wristctl.comparison.claims import NOMINAL, printed, rows_asked
 from wristctl.comparison.paper import T2, rounded
 from wristctl.comparison.tie_groups import Share, share
 from wristctl.comparison.unknowns_sampling import Reactions
@@ -142,31 +142,30 @@ class Strip:
 
 def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
     """The rows that the claims need, each once; those of a symmetry are run to both sides."""
-    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
-    labels = dict.fromkeys(label for claim in boxed for label in (claim.label, claim.than) if label)
-    return [Row(controller=name, gains=gains) for name, gains in (label.split("/") for label in labels)]
+    return rows_asked(_boxed(claims))
+
+
+def _boxed(claims: Sequence[Claim]) -> list[Claim]:
+    return [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == NOMINAL]
 
 
 def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None = None) -> list[Strip]:
     """Every claim that draws can judge, by those of its rows."""
-    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
-    values = {name: drawn.values(name) for name in drawn.settings[0].values}
+    values = {name: np.array(drawn.values(name), object) for name in drawn.settings[0].values}
     found = []
-    for claim in boxed:
+    for claim in _boxed(claims):
         if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
             continue
         ratios, judged = _judged(claim, drawn, mirrored)
         sound = _converged(claim, drawn, mirrored)
         verdicts = [verdict if counts else None for verdict, counts in zip(judged, sound, strict=True)]
         yes = np.array([verdict == "reproduced" for verdict in judged])[sound]
-        counted = {
-            name: [value for value, counts in zip(column, sound, strict=True) if counts]
-            for name, column in values.items()
-        }
-        leaves = deciding(yes, counted) if sound.any() else []
-        first = counted[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
-        cut = split(yes, first) if first and not isinstance(first[0], str) else None
-        description = _worded(leaves[0].name, yes, first, cut) if first else ""
+        counted = {name: column[sound].tolist() for name, column in values.items()}
+        leaves, cut, description = deciding(yes, counted) if sound.any() else [], None, ""
+        if leaves and leaves[0].share >= _LEAST:
+            first = counted[leaves[0].name]
+            cut = None if isinstance(first[0], str) else split(yes, first)
+            description = _worded(leaves[0].name, yes, first, cut)
         found.append(Strip(claim, ratios, verdicts, leaves, cut, description))
     return found
 

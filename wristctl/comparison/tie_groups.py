@@ -155,17 +155,13 @@ def standing(
     fates = np.select(marks, ["unreliable", "short", "unphysical"], "sound")
     sound, far, strained = ([row for row in by_mean if fates[row] == fate] for fate in ("sound", "short", "unphysical"))
     enough = len(sound) < 2 or score_array.shape[1] >= LEAST_PAIRS
+    groups, left = [], sound if enough else []
+    while left:
+        groups.append(comparisons.best(left))
+        left = [row for row in left if row not in groups[-1]]
     return Standing(
-        _groups(comparisons, sound) if enough else [], [] if enough else sound, strained, far,
+        groups, [] if enough else sound, strained, far,
         [row for row in rarest if fates[row] == "unreliable"],
         lost, [share(flags) for flags in failed], [share(flags) for flags in swings & ~failed],
         comparisons.resolution(sound),
     )  # fmt: skip
-
-
-def _groups(compared: Comparisons, rows: list[int]) -> list[list[int]]:
-    groups = []
-    while rows:
-        groups.append(compared.best(rows))
-        rows = [row for row in rows if row not in groups[-1]]
-    return groups

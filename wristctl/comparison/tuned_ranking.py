@@ -6,25 +6,25 @@ theirs. Its mean error, its order and what it is worth beside another are over a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from itertools import chain, combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised
+from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised, plain
 from wristctl.comparison.controller_ranking import STREAM
-from wristctl.comparison.repeated_tunings import HALVES, Firsts, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.repeated_tunings import HALVES, Firsts, RepeatedTunings, firsts, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
-from wristctl.config.families import TOLERATED
+from wristctl.config.families import TOLERATED, Family
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from wristctl.config.families import Family
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +57,10 @@ class TunedRanking(WorldRanking):
         """Ratio of a reference row's RMSE to another row's, tunings and worlds drawn anew."""
         return self.repeated.ratio(reference_row, row)
 
-    def firsts(self, row: int) -> Firsts:
-        """In how many halves of the worlds, and with how many tunings, a ranked row has the least error."""
-        return self._order.firsts(row)
+    @cached_property
+    def firsts(self) -> dict[int, Firsts]:
+        """In how many halves of the worlds, and with how many tunings, each ranked row has the least error."""
+        return firsts(self.logarithms, [*chain.from_iterable(self.standing.groups)], STREAM)
 
     def firsts_frame(self) -> pd.DataFrame:
         """A line for each ranked row: in how many halves of the worlds, and with how many tunings, it is first.
@@ -68,20 +69,17 @@ class TunedRanking(WorldRanking):
         """
         import pandas as pd
 
-        ranked_rows = [row for group in self.standing.groups for row in group]
-        lines = []
-        for row in ranked_rows if len(ranked_rows) > 1 else []:
-            halves, tunings, of_tunings = self.firsts(row)
-            lines.append(
-                {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
-                 "first_in_tunings": tunings, "tunings": of_tunings}
-            )  # fmt: skip
+        lines = [
+            {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
+             "first_in_tunings": tunings, "tunings": of_tunings}
+            for row, (halves, tunings, of_tunings) in (self.firsts if self.may_change else {}).items()
+        ]  # fmt: skip
         return pd.DataFrame(lines)
 
-    @cached_property
-    def _order(self) -> Order:
-        ranked_rows = [row for group in self.standing.groups for row in group]
-        return Order(self.logarithms, ranked_rows or range(len(self.rows)), STREAM)
+    @property
+    def may_change(self) -> bool:
+        """Whether two rows or more are ranked, so that another could come first."""
+        return sum(map(len, self.standing.groups)) > 1
 
     @cached_property
     def spreads(self) -> list[tuple[float, float]]:
@@ -142,12 +140,95 @@ def logarithms(tunings: Sequence[Sequence[RankedRow]]) -> Array:
 
 def _streams(row: RankedRow) -> Array:
     """Geometric mean over the motions of a row's RMSE (W, S) in every world and stream of noise; inf: one failed."""
-    measured, worlds = row.measured, len(row.rmse)
-    rmse = np.where(measured.failed, np.inf, measured.metrics["rmse"]).reshape(worlds, row.motions, -1)
-    means: Array = np.exp(np.log(rmse).mean(axis=1))
+    rmse = np.where(row.measured.failed, np.inf, row.measured.metrics["rmse"])
+    means: Array = np.exp(np.log(rmse.reshape(len(row.rmse), row.motions, -1)).mean(axis=1))
     return means
 
 
 def published_tuning(tunings: Sequence[RankedRow]) -> int:
     """The median tuning of a row by its geometric mean error: whose gains are neither lucky nor unlucky."""
     return median_tuning([float(np.log(penalised(row.rmse)).mean()) for row in tunings])
+
+
+class TermValue(NamedTuple):
+    """Ratio of the errors without and with a term of a law, on a family's worlds."""
+
+    term: str
+    family: str
+    without: str
+    given: str
+    times: GeometricMean
+    swings: tuple[int, int]
+    """In how many worlds each of the two fails, swings or chatters."""
+
+    @property
+    def told(self) -> str:
+        """The ratio with its interval; undecided where that holds 1, worse below; and the worlds that are lost."""
+        value, low, high = (_ratio(ratio) for ratio in self.times[:3])
+        word = "undecided " if self.times.is_one else "worse " if self.times.value < 1.0 else ""
+        lost = f", lost {self.swings[0]} -> {self.swings[1]}" if any(self.swings) else ""
+        return f"{word}{value} [{low}, {high}]{lost}"
+
+
+def _ratio(value: float) -> str:
+    if not math.isfinite(value):
+        return "any"
+    return f"{value:.3f}" if 0.9 <= value <= 1.1 else plain(value)
+
+
+def term_values(ranking: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:
+    """Value of every term whose rows without and with it are both in the ranking."""
+    places, lost = {row.label: index for index, row in enumerate(ranking.rows)}, ranking.standing.lost
+    values = []
+    for term, (without, with_term) in terms.items():
+        if without in places and with_term in places:
+            pair = places[without], places[with_term]
+            times = ranking.times_better(pair[1], pair[0])
+            values.append(
+                TermValue(term, ranking.name, without, with_term, times, (lost[pair[0]].times, lost[pair[1]].times))
+            )
+    return values
+
+
+_SHIFT_STREAM = 20_033
+
+
+class OrderShift(NamedTuple):
+    """Change in the order of the same laws under another way to tune."""
+
+    variant: str
+    tau: float
+    """Kendall's rank correlation of the two orders (Biometrika 30 (1938) 81); nan for one law."""
+    pairs: int
+    resolved: int
+    """Pairs of laws that can be told apart under both."""
+    reversed: int
+    """Number of those pairs that change places."""
+    best: tuple[str, str]
+    """Before and after."""
+    ratio: float
+    """Geometric mean over laws and worlds of the RMSE after over that before."""
+
+
+def order_shift(
+    variant: str, before: Sequence[Sequence[RankedRow]], after: Sequence[Sequence[RankedRow]]
+) -> OrderShift:
+    """Compare rows of the same laws, in the same order, on the same worlds, each with its tunings before and after."""
+    from scipy.stats import kendalltau
+
+    errors = logarithms(before), logarithms(after)
+    means = [of_side.mean(axis=(1, 2, 3)) for of_side in errors]
+    signs = _signs(errors[0]) * _signs(errors[1])
+    best = tuple(rows[int(np.argmin(mean))][0].label for rows, mean in zip((before, after), means, strict=True))
+    tau = float(kendalltau(*means).statistic) if len(before) > 1 else float("nan")
+    ratio = float(np.exp(np.mean(means[1] - means[0])))
+    return OrderShift(
+        variant, tau, len(signs), int(np.sum(signs != 0)), int(np.sum(signs < 0)), (best[0], best[1]), ratio
+    )  # fmt: skip
+
+
+def _signs(errors: Array) -> Array:
+    """Sign of the better row in every pair of rows (R, T, W, S); 0 where tunings and worlds do not decide."""
+    repeated = RepeatedTunings(errors, _SHIFT_STREAM)
+    ratios = [repeated.ratio(*pair) for pair in combinations(range(len(errors)), 2)]
+    return np.array([float(ratio.low > 1.0) - float(ratio.high < 1.0) for ratio in ratios])

@@ -43,6 +43,34 @@ class Courses(NamedTuple):
     """Courses whose numbers do not depend on the integration step, (N,)"""
 
 
+class _Seen:
+    """Courses within their horizons: what all readings have in common."""
+
+    def __init__(self, of: Courses) -> None:
+        self._of = of
+        self.time: Array = np.arange(of.theta.shape[1], dtype=np.float64) * of.period
+        self.inside: NDArray[np.bool_] = np.array(self.time < of.horizons[:, None] - 0.5 * of.period, bool)
+        self.alive: NDArray[np.bool_] = np.array(np.isfinite(np.where(self.inside, of.theta, 0.0)).all(axis=1), bool)
+        theta = np.where(self.alive[:, None], of.theta, 0.0)
+        self.size, self.away = (
+            np.where(self.inside, np.abs(theta - aim), 0.0) for aim in (of.wanted, of.wanted[:, -1:])
+        )
+        self.rmse: Array = np.sqrt((self.size**2).sum(axis=1) / self.inside.sum(axis=1))
+
+    def late(self, since: Array) -> Array:
+        """Mean size of the error from these times [s] on, (N,)."""
+        late = self.inside & (self.time >= since[:, None] - 1e-9)
+        mean: Array = (self.size * late).sum(axis=1) / late.sum(axis=1)
+        return mean
+
+    def last(self, away: Array, band: float) -> tuple[Array, NDArray[np.bool_]]:
+        """When a distance (N, T) was last beyond a share of the final reference [s], 0: never; and who then rests."""
+        of, outside = self._of, np.array(away > band * np.abs(self._of.wanted[:, -1:]), bool)
+        place = len(self.time) - 1 - outside[:, ::-1].argmax(axis=1)
+        last = np.where(outside.any(axis=1), self.time[place], 0.0)
+        return last, np.array((of.rests < of.horizons) & (last < of.horizons - 1.5 * of.period), bool)
+
+
 def readings(of: Courses) -> dict[str, Array]:
     """READINGS by name, (N,) each.
 
@@ -50,36 +78,21 @@ def readings(of: Courses) -> dict[str, Array]:
     over the motion, last time outside +-2 % of the final reference, from the start and from when the reference rests,
     and the mean |e| of the last 10 %. What has failed, or never settles, is nan.
     """
-    theta, wanted, rests, horizons, period, _ = of
-    time: Array = np.arange(theta.shape[1], dtype=np.float64) * period
-    error, final = theta - wanted, wanted[:, -1:]
-    inside: NDArray[np.bool_] = np.array(time[None, :] < horizons[:, None] - 0.5 * period, bool)
-    alive: NDArray[np.bool_] = np.array(np.isfinite(np.where(inside, theta, 0.0)).all(axis=1), bool)
-    kept = np.where(inside & alive[:, None], error, 0.0)
-    count = inside.sum(axis=1)
-    moving = inside & (time <= rests[:, None])
-    late = inside & (time >= 0.9 * horizons[:, None] - 1e-9)
-    away = np.abs(np.where(alive[:, None], theta, 0.0) - final)
-    last = _last_exit(np.where(inside, away, 0.0), BAND * np.abs(final), time)
-    settled = (rests < horizons) & (last < horizons - 1.5 * period)
-    rmse = np.sqrt((kept**2).sum(axis=1) / count)
-    of_move = np.sqrt((kept**2 * moving).sum(axis=1) / np.maximum(moving.sum(axis=1), 1))
+    seen, rests = _Seen(of), of.rests
+    moving = seen.inside & (seen.time <= rests[:, None])
+    of_move = np.sqrt((seen.size**2 * moving).sum(axis=1) / np.maximum(moving.sum(axis=1), 1))
+    last, settled = seen.last(seen.away, BAND)
     settling = np.where(settled, last, np.nan)
+    steady = seen.late(0.9 * of.horizons)
     metrics = {
-        "rmse": rmse,
-        "rmse_move": np.where(rests <= 0.0, rmse, of_move),
+        "rmse": seen.rmse,
+        "rmse_move": np.where(rests <= 0.0, seen.rmse, of_move),
         "settling": settling,
         "settling_after": np.maximum(settling - rests, 0.0),
-        "steady_state": (np.abs(kept) * late).sum(axis=1) / late.sum(axis=1),
+        "steady_state": steady,
+        "missing": steady / np.abs(np.where(seen.inside, of.wanted, 0.0)).max(axis=1),
     }
-    metrics["missing"] = metrics["steady_state"] / np.abs(np.where(inside, wanted, 0.0)).max(axis=1)
-    return {name: np.where(alive, values, np.nan) for name, values in metrics.items()}
-
-
-def _last_exit(away: Array, band: Array, time: Array) -> Array:
-    """The last time (N,) at which a distance (N, T) was beyond the band (N, 1); 0 where it never was."""
-    outside: NDArray[np.bool_] = np.array(away > band, bool)
-    return np.where(outside.any(axis=1), time[len(time) - 1 - outside[:, ::-1].argmax(axis=1)], 0.0)
+    return {name: np.where(seen.alive, values, np.nan) for name, values in metrics.items()}
 
 
 def usual(of: Courses) -> tuple[list[str], Array]:
@@ -89,28 +102,17 @@ def usual(of: Courses) -> tuple[list[str], Array]:
     of the error about none; the steady-state error the mean |e| of the last 10 % or of the last second. No reading is
     of one sample: of a loop that swings it would be what the swing happens to pass.
     """
-    time: Array = np.arange(of.theta.shape[1], dtype=np.float64) * of.period
-    inside = time < of.horizons[:, None] - 0.5 * of.period
-    alive: NDArray[np.bool_] = np.array(np.isfinite(np.where(inside, of.theta, 0.0)).all(axis=1), bool)
-    theta, final = np.where(alive[:, None], of.theta, 0.0), of.wanted[:, -1:]
-    size = np.where(inside, np.abs(theta - of.wanted), 0.0)
-    rmse = np.sqrt((size**2).sum(axis=1) / inside.sum(axis=1))
-    ends = {
-        "last 10 %": 0.1 * of.horizons,
-        "last second": np.minimum(1.0, of.horizons),
-    }
-    steady = {}
-    for name, lasting in ends.items():
-        late = inside & (time >= (of.horizons - lasting)[:, None] - 1e-9)
-        steady[name] = (size * late).sum(axis=1) / late.sum(axis=1)
+    seen = _Seen(of)
+    lasting = {"last 10 %": 0.1 * of.horizons, "last second": np.minimum(1.0, of.horizons)}
+    steady = {name: seen.late(of.horizons - span) for name, span in lasting.items()}
     names, columns = [], []
-    for reading, away in (("angle", np.where(inside, np.abs(theta - final), 0.0)), ("error", size)):
+    for reading, away in (("angle", seen.away), ("error", seen.size)):
         for band in (0.01, 0.02, 0.05):
-            last = _last_exit(away, band * np.abs(final), time)
-            settled = (of.rests < of.horizons) & (last < of.horizons - 1.5 * of.period) & alive
+            last, settled = seen.last(away, band)
             for name, error in steady.items():
                 names.append(f"{reading} within {100 * band:.0f} %, {name}")
-                columns.append(np.where(settled[:, None], np.stack([rmse, last, error], axis=1), np.nan))
+                sound = (settled & seen.alive)[:, None]
+                columns.append(np.where(sound, np.stack([seen.rmse, last, error], axis=1), np.nan))
     return names, np.stack(columns, axis=1)
 
 
@@ -146,21 +148,15 @@ def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSet
 
 def continuous_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSetting]:
     """As many of them as asked for with ideal measurement in nearly continuous time: of one segment, then of four."""
-    settings = []
+    settings, sensor = [], box.model_copy(update={"unknowns": {}}).setting(wrist, {}).loop.sensor
     for segments, count in zip((1, 4), box.continuous, strict=False):
         shares = {name: _latin(count, seed, f"{name}, continuous {segments}") for name in box.unknowns}
         for k in range(count):
             setting = box.setting(wrist, {name: float(share[k]) for name, share in shares.items()})
-            plain = box.model_copy(update={"unknowns": {}}).setting(wrist, {})
-            update = {"control_period": CONTINUOUS, "plant_segments": segments, "sensor": plain.loop.sensor}
-            values = {**setting.values, "loop.control_period": CONTINUOUS, "loop.plant_segments": segments}
-            settings.append(
-                setting._replace(
-                    loop=setting.loop.model_copy(update=update),
-                    measured="ideal",
-                    values={**values, "measured": "ideal"},
-                )
-            )
+            update = {"control_period": CONTINUOUS, "plant_segments": segments, "sensor": sensor}
+            known = {"loop.control_period": CONTINUOUS, "loop.plant_segments": segments, "measured": "ideal"}
+            loop, values = setting.loop.model_copy(update=update), {**setting.values, **known}
+            settings.append(setting._replace(loop=loop, measured="ideal", values=values))
     return settings
 
 
@@ -174,11 +170,12 @@ def react(
     metrics = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
     converged = {row.label: np.zeros(len(settings), bool) for row in rows}
     work = [(batch, row) for batch in _alike(settings) for row in rows]
-
     finished, stop = 0, Event()
 
     def ran(task: tuple[NDArray[np.intp], Row]) -> Courses:
-        return _ran(task[1], [settings[index] for index in task[0]], mirrored, stop)
+        own = [settings[index] for index in task[0]]
+        references = [each.reference.mirrored() if mirrored else each.reference for each in own]
+        return courses(task[1], own, references, 1, stop)
 
     with stoppable(cores(), stop) as pool:
         for (own, row), done_there in zip(work, pool.map(ran, work), strict=True):
@@ -192,11 +189,11 @@ def react(
 
 
 def courses(
-    row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference], threads: int | None = None,
-    stop: Event | None = None,
+    row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference] | None = None,
+    threads: int | None = None, stop: Event | None = None,
 ) -> Courses:  # fmt: skip
-    """Courses of one row in settings that can run in one batch, with one reference a setting."""
-    law = controller(row.controller)
+    """Courses of one row in settings that can run in one batch, with a reference for each, or its own."""
+    law, references = controller(row.controller), references or [setting.reference for setting in settings]
     gains = np.tile(gains_of(law, row.gains, None), (len(settings), 1))
     if settings[0].measured == "differenced":
         law = differenced(law)
@@ -211,12 +208,6 @@ def courses(
     )  # fmt: skip
     rests = np.array([move.rest for move in motions])
     return Courses(out.columns("theta"), out.references[:, 0], rests, horizons, period, ~out.unconverged)
-
-
-def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> Courses:
-    """Courses of one row in a batch of settings."""
-    references = [setting.reference.mirrored() if mirrored else setting.reference for setting in settings]
-    return courses(row, settings, references, 1, stop)
 
 
 def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:

@@ -58,21 +58,24 @@ def joint(verdicts: Iterable[VerdictName]) -> VerdictName | None:
 def of_numbers(paper: float | Ends, ours: ArrayLike, sense: SenseName = "about") -> Finding:
     """Our values, one for each stated motion, beside the paper's; of all of them less is better."""
     values, printed = np.asarray(ours, float), _ends(paper)
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return Finding("worse than the paper" if sense == "about" else "does not hold", reason=_NEVER)
-    low, high = float(finite.min()), float(finite.max())
+    if not np.isfinite(values).any():
+        return Finding(_worst(sense), reason=_NEVER)
+    low, high = _range(values)
     if sense != "about":
         return _bounded(printed, values, sense)._replace(low=low, high=high)
-    if low > FACTOR * printed.high:
-        return Finding("worse than the paper", low, high)
-    if len(finite) < len(values):
+    if not np.isfinite(values).all() and low <= FACTOR * printed.high:
         return Finding(_OPEN, low, high, "on one motion it fails or never settles, on another not")
-    if high < printed.low / FACTOR:
-        return Finding("better than the paper", low, high)
-    if high >= SPREAD * low:
-        return Finding(_OPEN, low, high, "the motion decides, and the paper does not give it")
-    return Finding("reproduced", low, high)
+    return _about(printed, low, high, Finding(_OPEN, low, high, "the motion decides, and the paper does not give it"))
+
+
+def _worst(sense: SenseName) -> VerdictName:
+    return "worse than the paper" if sense == "about" else "does not hold"
+
+
+def _range(values: Array) -> Ends:
+    """The least and the greatest of the finite values."""
+    finite = values[np.isfinite(values)]
+    return Ends(float(finite.min()), float(finite.max()))
 
 
 def _bounded(paper: Ends, values: Array, sense: SenseName) -> Finding:
@@ -109,10 +112,9 @@ def of_settling(paper: float | Ends, after: ArrayLike, motions: ArrayLike) -> Fi
     if not moving.any():
         return of_numbers(paper, after)
     values = np.asarray(after, float)
-    finite = values[np.isfinite(values)]
-    if not len(finite):
+    if not np.isfinite(values).any():
         return Finding("worse than the paper", reason=_NEVER)
-    low, high = float(finite.min()), float(finite.max())
+    low, high = _range(values)
     if low > FACTOR * _ends(paper).high:
         return Finding("worse than the paper", low, high, "from the end of the motion alone")
     return Finding(_OPEN, low, high, "counted from the end of the motion; how long the paper's lasts is not given")
@@ -144,12 +146,13 @@ def of_sample(
 ) -> Finding:
     """A median over seeds with its interval beside the paper's value; where the interval is too wide it stays open."""
     if not np.isfinite(middle):
-        verdict: VerdictName = "worse than the paper" if sense == "about" else "does not hold"
-        return Finding(verdict, reason="there is no such number")
+        return Finding(_worst(sense), reason="there is no such number")
     low, high = ends or (middle, middle)
     printed = _ends(paper)
     if sense == "about":
-        return _about(printed, low, high)
+        return _about(
+            printed, low, high, Finding("open", low, high, "the interval is too wide: more seeds would decide")
+        )
     if sense == "exactly":
         inside = low <= printed.high and high >= printed.low
         return Finding("reproduced" if inside else "does not hold", low, high)
@@ -159,11 +162,9 @@ def of_sample(
     return Finding("open", low, high, "more seeds would decide")
 
 
-def _about(paper: Ends, low: float, high: float) -> Finding:
+def _about(paper: Ends, low: float, high: float, wide: Finding) -> Finding:
     if low > FACTOR * paper.high:
         return Finding("worse than the paper", low, high)
     if high < paper.low / FACTOR:
         return Finding("better than the paper", low, high)
-    if low <= 0.0 or high >= SPREAD * low:
-        return Finding("open", low, high, "the interval is too wide: more seeds would decide")
-    return Finding("reproduced", low, high)
+    return wide if high >= SPREAD * low else Finding("reproduced", low, high)

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.controller_ranking import LIMITS, STREAM, Ranking, Traits, counted
+from wristctl.comparison.combinations import within
+from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted, time_at_limits
 from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
-from wristctl.config.families import TOLERATED, Family, Worlds
+from wristctl.config.families import TOLERATED, Family
 from wristctl.config.study import Study
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.simulation.cases import Measured, measure
@@ -88,11 +89,6 @@ def kinds_of(family: Family) -> dict[bool, list[int]]:
     return {kind: chosen for kind, chosen in kinds.items() if chosen}
 
 
-def seed_of(study: Study, worlds: Worlds) -> int:
-    """Seed of the split that the worlds are drawn from."""
-    return study.seed if worlds.sealed is None else worlds.sealed
-
-
 def rank(
     study: Study,
     tuned: TunedGains | None = None,
@@ -105,37 +101,36 @@ def rank(
     """
     worlds = study.compare.worlds
     family, name = study.families[worlds.family], worlds.family
-    cases = drawn_cases(family, name, worlds.split, seed_of(study, worlds), worlds.draws, study.wrist, network)
+    seed = study.seed if worlds.sealed is None else worlds.sealed
+    cases = drawn_cases(family, name, worlds.split, seed, worlds.draws, study.wrist, network)
     rows = list(study.compare.rows)
     if not any(row.controller == YARDSTICK for row in rows):
         rows.append(Row(controller=YARDSTICK, gains="default"))
     kinds, every = kinds_of(family), list[Measured]()
     laws = [controller(row.controller) for row in rows]
-    repetitions = [law.learning for law in laws]
-    for number, (law, row) in enumerate(zip(laws, rows, strict=True)):
-
-        def report(share: float, number: int = number) -> None:
-            if progress is not None:
-                progress((sum(repetitions[:number]) + share * repetitions[number]) / sum(repetitions))
-
+    ends = np.cumsum([0, *(law.learning for law in laws)]) / sum(law.learning for law in laws)
+    for law, row, begin, end in zip(laws, rows, ends[:-1], ends[1:], strict=True):
         gains = np.array([gains_of(law, row.gains, tuned, family.loop)])
-        every.append(measure(law, gains, cases, study.wrist, RANKED, report))
+        every.append(measure(law, gains, cases, study.wrist, RANKED, within(progress, begin, end)))
     rankings = []
     for kind, chosen in kinds.items():
         measured = [one.of_motions(chosen, len(family.references)) for one in every]
         open_loop = next(one for one, row in zip(measured, rows, strict=True) if row.controller == YARDSTICK)
-        ranked = [_row(row.label, one, open_loop, worlds.draws) for one, row in zip(measured, rows, strict=True)]
+        ranked = [
+            measured_row(row.label, one, open_loop, worlds.draws) for one, row in zip(measured, rows, strict=True)
+        ]
         rankings.append(ranking(name, family, ranked, steps=kind))
     return rankings
 
 
-def _row(label: str, measured: Measured, open_loop: Measured, worlds: int) -> RankedRow:
+def measured_row(label: str, measured: Measured, open_loop: Measured, worlds: int) -> RankedRow:
+    """A row of a ranking from what was measured of it, and of feedforward, on the motions of so many worlds."""
     swings = np.any(measured.swings_beside(open_loop).reshape(worlds, -1), axis=1)
     return RankedRow(label, world_scores(measured, worlds)[0], swings, measured, measured.failed.shape[1] // worlds)
 
 
 def world_scores(measured: Measured, worlds: int) -> Array:
-    """Geometric mean of the RMSE [rad] over the motions of each world, (P, worlds); inf where one failed."""
+    """Geometric mean of the RMSE [rad] over all that was measured in each world, (P, worlds); inf where one failed."""
     rmse = np.where(measured.failed, np.inf, measured.metrics["rmse"])
     scores: Array = np.exp(np.log(rmse).reshape(len(rmse), worlds, -1).mean(axis=2))
     return scores
@@ -182,11 +177,7 @@ def ranking(
         traits=_traits(family, kind),
         family=family,
         rows=list(rows),
-        at_limit={
-            limit: np.array([one.metrics[metric].mean() for one in measured])
-            for limit, metric in LIMITS.items()
-            if all(metric in one.metrics for one in measured)
-        },
+        at_limit=time_at_limits([[one.metrics] for one in measured]),
     )
 
 
@@ -205,20 +196,11 @@ def ranking_frame(ranked: WorldRanking) -> pd.DataFrame:
 
     lines = []
     for index in ranked.standing.order:
-        row, mean, gain = ranked.rows[index], ranked.means[index], ranked.gains[index]
-        failures, swings, lost = (
-            ranked.standing.failures[index],
-            ranked.standing.swings[index],
-            ranked.standing.lost[index],
-        )
+        row, gain, stands = ranked.rows[index], ranked.gains[index], ranked.standing
+        failures, swings, lost = stands.failures[index], stands.swings[index], stands.lost[index]
         lines.append(
-            {
-                "row": row.label,
-                "group": ranked.standing.group(index),
-                "fate": ranked.standing.fate(index),
-                "rmse": mean.value,
-                "rmse_low": mean.low,
-                "rmse_high": mean.high,
+            ranked.line(index)
+            | {
                 "times_better": gain.value,
                 "times_better_low": gain.low,
                 "times_better_high": gain.high,
@@ -304,11 +286,7 @@ def judged(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     measured = measure(law, np.array([law.values(spec["gains"])]), cases, study.wrist, RANKED)
     shape = worlds, len(family.references), noises
     arrays = {metric: values.reshape(shape) for metric, values in measured.metrics.items()}
-    return arrays | {
-        "failed": measured.failed.reshape(shape),
-        "lasted": measured.lasted.reshape(shape),
-        "rests": measured.rests.reshape(shape),
-    }
+    return arrays | {name: getattr(measured, name).reshape(shape) for name in ("failed", "lasted", "rests")}
 
 
 def row_of(
@@ -328,26 +306,23 @@ def row_of(
     `tension_range` is the wrist's, from pretension to limit [N], `places` the number of places of tendons.
     """
     chosen = slice(None) if motions is None else list(motions)
-    metrics_of_worlds = {
-        name: np.concatenate([piece[name] for piece in pieces])[:, chosen, :noises] for name in pieces[0]
-    }
-    rests_at_end = metrics_of_worlds["rests"][:, :, 0]
+
+    def joined(name: str, of: Sequence[Mapping[str, np.ndarray]] = pieces) -> np.ndarray:
+        return np.concatenate([piece[name] for piece in of])[:, chosen, :noises]
+
+    failed, rests = joined("failed"), joined("rests")
+    rests_at_end = rests[:, :, 0]
     moving = np.zeros(rests_at_end.shape, bool)
     if open_loop is not None:
-        without = np.concatenate([piece["sustained"] for piece in open_loop])[:, chosen, :noises]
-        middle, allowed = (
-            np.median(np.nan_to_num(of_row), axis=2) for of_row in (metrics_of_worlds["sustained"], without)
-        )
+        of_both = joined("sustained"), joined("sustained", open_loop)
+        middle, allowed = (np.median(np.nan_to_num(of_row), axis=2) for of_row in of_both)
         moving = (middle > LIMIT_CYCLE + 2.0 * allowed) & ~rests_at_end
-    failed, worlds = metrics_of_worlds["failed"], len(metrics_of_worlds["failed"])
-    rmse = np.where(failed, np.inf, metrics_of_worlds["rmse"])
-    scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))
-    left = np.median(
-        np.where(np.isnan(metrics_of_worlds["oscillation"]), 0.0, metrics_of_worlds["oscillation"]), axis=2
-    )
-    chatters = chatter(np.median(metrics_of_worlds["chattering"], axis=2), tension_range, places) > 0.0
-    unsound = ((left > LIMIT_CYCLE) & rests_at_end) | moving | chatters | (metrics_of_worlds["drift"] > 0.0).any(axis=2)
-    metrics = {name: metrics_of_worlds[name].reshape(1, -1) for name in RANKED}
-    lasted, rests = metrics_of_worlds["lasted"].reshape(1, -1), metrics_of_worlds["rests"].ravel()
-    measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range, places)
-    return RankedRow(label, scores, unsound.any(axis=1), measured, failed.shape[1])
+    metrics = {name: joined(name) for name in RANKED}
+    oscillation = metrics["oscillation"]
+    left = np.median(np.where(np.isnan(oscillation), 0.0, oscillation), axis=2)
+    chatters = chatter(np.median(metrics["chattering"], axis=2), tension_range, places) > 0.0
+    unsound = ((left > LIMIT_CYCLE) & rests_at_end) | moving | chatters | (metrics["drift"] > 0.0).any(axis=2)
+    flat = {name: values.reshape(1, -1) for name, values in metrics.items()}
+    lasted = joined("lasted").reshape(1, -1)
+    measured = Measured(flat, failed.reshape(1, -1), lasted, rests.ravel(), tension_range, places)
+    return RankedRow(label, world_scores(measured, len(failed))[0], unsound.any(axis=1), measured, failed.shape[1])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from typing import TYPE_CHECKING, Any
 
-from wristctl.config.wrist import WristParameters
 from wristctl.records.run import Run
 
 if TYPE_CHECKING:
@@ -33,23 +32,18 @@ def animation(run: Run) -> dict[str, Any] | None:
         return None
     if not courses:
         return None
-    step = max(1, round(1.0 / FRAMES / float(time[1] - time[0])))
-    wrist = run.config.wrist
+    step, wrist = max(1, round(1.0 / FRAMES / float(time[1] - time[0]))), run.config.wrist
     return {
-        "wrist": _wrist(wrist),
+        "wrist": {
+            "length": wrist.length,
+            "discs": wrist.discs,
+            "offset": wrist.tendon_offset,
+            "radius": wrist.tendon_radius,
+            "hand": wrist.hand_offset,
+        },
         "step": float(time[step] - time[0]),
         "duration": float(time[-1] - time[0]),
         "courses": [_course(*course, step) for course in courses],
-    }
-
-
-def _wrist(wrist: WristParameters) -> dict[str, float]:
-    return {
-        "length": wrist.length,
-        "discs": wrist.discs,
-        "offset": wrist.tendon_offset,
-        "radius": wrist.tendon_radius,
-        "hand": wrist.hand_offset,
     }
 
 
@@ -62,35 +56,37 @@ def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
         return [], series["time"][0]
     bent = series.get("segment_theta", series["theta"][..., None])
     many = table["inverse"].nunique() > 1
-    names = [
-        (
-            f"{row.loop}, {row.reference}" + (f", {row.inverse} inverse" if many else ""),
-            f"{row.controller}/{row.gains}",
-            str(row.controller),
-        )
-        for row in table.itertuples()
-    ]
     arcs = {name for name, loop in run.config.compare.loops.items() if loop.plant.model == "pcc"}
-    drawn = [k for k, loop in enumerate(table["loop"]) if loop in arcs]
-    return [(*names[k], bent[k], series["theta_desired"][k]) for k in drawn], series["time"][0]
+    courses: list[Named] = []
+    for row, angles, wanted in zip(table.to_dict("records"), bent, series["theta_desired"], strict=True):
+        if row["loop"] in arcs:
+            group = f"{row['loop']}, {row['reference']}" + f", {row['inverse']} inverse" * many
+            courses.append((group, f"{row['controller']}/{row['gains']}", str(row["controller"]), angles, wanted))
+    return courses, series["time"][0]
+
+
+def columns_of(run: Run, table: str) -> dict[str, np.ndarray]:
+    """Columns of numbers of a run's table by name, (rows,) each, sooner than pandas is loaded."""
+    import numpy as np
+
+    with run.file(f"data/{table}.csv").open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    return dict(zip(names, numbers.T, strict=True))
 
 
 def _single(run: Run) -> tuple[list[Named], np.ndarray]:
     import numpy as np
 
-    with run.file("data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
-        names, *rows = csv.reader(file)
-    numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
-    table = dict(zip(names, numbers.T, strict=True))
+    table = columns_of(run, "trajectory")
     angle_columns = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
     settings = getattr(run.config, run.kind.replace("-", "_"))
     if settings.loop.plant.model != "pcc":
         return [], table["time"]
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
     name = ("", f"{settings.controller}/{gains}", settings.controller)
-    return [(*name, np.stack([table[column] for column in angle_columns], axis=1), table["theta_desired"])], table[
-        "time"
-    ]
+    bent = np.stack([table[column] for column in angle_columns], axis=1)
+    return [(*name, bent, table["theta_desired"])], table["time"]
 
 
 def _trials(run: Run) -> tuple[list[Named], np.ndarray]:

@@ -31,16 +31,9 @@ def mark_of(listed: Sequence[IndexEntry]) -> str:
 
 
 def index_page(results: Path, listed: Sequence[IndexEntry], advance: Advance = lambda count: None) -> str:
-    """The page of runs of a folder, newest first.
+    """The page of a folder's runs, `listed` with their tags, oldest first; the newest are on top.
 
-    Parameters
-    ----------
-    results
-        Folder of run directories.
-    listed
-        Its runs, oldest first, with their tags.
-    advance
-        Called with the number of runs whose picture is ready.
+    `advance` is called with the number of runs whose picture is ready.
     """
     newest = listed[::-1]
     pictures = _pictures(results, newest, advance)
@@ -92,7 +85,8 @@ def _pictures(results: Path, listed: Sequence[IndexEntry], advance: Advance) -> 
         file = results / entry.id / "figures" / f"{entry.figure}.png"
         if entry.figure and (stamp := _stamp(file)):
             old = remembered.get(entry.id)
-            current[entry.id] = old if _is_of(old, stamp) else [stamp, _small(file)]
+            known = isinstance(old, list) and len(old) == 2 and old[0] == stamp and isinstance(old[1], str)
+            current[entry.id] = old if known else [stamp, _small(file)]
         advance(count)
     if current != remembered:
         write_beside(results, PICTURES, json.dumps(current))
@@ -105,11 +99,6 @@ def _remembered(results: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def _is_of(old: Any, stamp: list[int]) -> bool:
-    """Whether this is a remembered picture of the file with this stamp."""
-    return isinstance(old, list) and len(old) == 2 and old[0] == stamp and isinstance(old[1], str)
 
 
 def _stamp(file: Path) -> list[int] | None:

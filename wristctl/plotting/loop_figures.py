@@ -82,8 +82,11 @@ def _draw_angles(axes: Axes, trajectories: Sequence[Trajectory], seen: str = "{}
         axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
         if (measured := _apart(course.seen, course.theta)) is not None:
             axes.plot(course.time, np.degrees(measured), label=seen.format(course.label), **THIN)
-    draw_desired(axes, trajectories)
-    within_half_a_move(axes, trajectories)
+    _draw_desired(axes, trajectories)
+    wanted = np.degrees(np.concatenate([course.theta_desired for course in trajectories]))
+    low, high = wanted.min(initial=0.0), wanted.max(initial=0.0)
+    margin = max(5.0, 0.5 * (high - low))  # so that a diverging loop hides no other
+    _at_most(axes, low - margin, high + margin)
     axes.set_ylabel("bending angle [deg]")
 
 
@@ -94,7 +97,8 @@ def _draw_errors(axes: Axes, trajectories: Sequence[Trajectory], seen: str = "{}
             error = np.degrees(measured - course.theta_ref)
             axes.plot(course.time, error, label=seen.format(course.label), **THIN)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    _within_errors(axes, trajectories)
+    largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
+    _at_most(axes, -2.0 * largest - 0.5, 2.0 * largest + 0.5)
     axes.set_ylabel("error [deg]")
 
 
@@ -207,7 +211,7 @@ def label(trajectory: Trajectory) -> str:
     return trajectory.label if np.isfinite(trajectory.theta).all() else f"{trajectory.label} (diverged)"
 
 
-def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+def _draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     """Draw the desired angle [deg] as a band behind the lines, and each other reference dotted."""
     wanted = trajectories[0].theta_desired
     axes.plot(trajectories[0].time, np.degrees(wanted), **WANTED)
@@ -216,20 +220,6 @@ def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
         if not any(np.allclose(course.theta_ref, earlier, atol=1e-6) for earlier in drawn):
             drawn.append(course.theta_ref)
             axes.plot(course.time, np.degrees(course.theta_ref), label="reference", **DOTTED)
-
-
-def within_half_a_move(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
-    """Let the axis of angles [deg] end half a move beyond what is desired, so that a diverging loop hides no other."""
-    wanted = np.degrees(np.concatenate([course.theta_desired for course in trajectories]))
-    low, high = wanted.min(initial=0.0), wanted.max(initial=0.0)
-    margin = max(5.0, 0.5 * (high - low))
-    _at_most(axes, low - margin, high + margin)
-
-
-def _within_errors(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
-    """Let the axis of errors [deg] end at twice the largest angle that is wanted."""
-    size = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
-    _at_most(axes, -2.0 * size - 0.5, 2.0 * size + 0.5)
 
 
 def _at_most(axes: Axes, low: float, high: float) -> None:

@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from functools import cache
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -72,31 +71,19 @@ def lineage_picture(tree: Ancestor) -> str:
     width = (max(columns.values()) + 1) * (_WIDTH + _GAP) - _GAP + 4
     height = (max(rows.values()) + 1) * _ROW
     place = {name: (2 + columns[name] * (_WIDTH + _GAP), 6 + rows[name] * _ROW) for name in nodes}
-    parts = [_arrow(place[start], place[end]) for start, end in edges]
-    parts += [_box(node, *place[name], is_root=name == tree.id) for name, node in nodes.items()]
-    return (
-        f'<svg class="lineage" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" '
-        f'aria-label="lineage">{"".join(parts)}</svg>'
-    )
-
-
-def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
-    x, y, to_x, to_y = start[0] + _WIDTH, start[1] + _HEIGHT // 2, end[0], end[1] + _HEIGHT // 2
-    middle = to_x - _GAP // 2
-    line = f"M{x} {y}C{middle} {y} {middle} {to_y} {to_x - 6} {to_y}"
-    return f'<path class="edge" d="{line}"/><path class="head" d="M{to_x} {to_y}l-8 -4v8z"/>'
-
-
-def _box(node: Ancestor, x: int, y: int, is_root: bool) -> str:
-    kind = escape(_WORDS.get(node.kind, node.kind))
-    name = printable(node.id)
-    short = escape(name if len(name) <= 26 else f"{name[:16]} … {name[-6:]}")
-    mark = ' class="own"' * is_root + ' class="odd"' * (not is_root and node.state != "ok")
-    state = "" if node.state == "ok" else f" ({escape(node.state)})"
-    return (
-        f"<g{mark}><title>{escape(name)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
-        f"<text x='{x + 10}' y='{y + 18}'>{kind}{state}</text>"
-        f"<text class='id' x='{x + 10}' y='{y + 34}'>{short}</text></g>"
+    middle = _HEIGHT // 2
+    return render(
+        "lineage.svg",
+        width=width,
+        height=height,
+        wide=_WIDTH,
+        high=_HEIGHT,
+        gap=_GAP,
+        arrows=[(place[a][0] + _WIDTH, place[a][1] + middle, place[b][0], place[b][1] + middle) for a, b in edges],
+        boxes=[
+            (printable(name), _WORDS.get(node.kind, node.kind), node.state, name == tree.id, *place[name])
+            for name, node in nodes.items()
+        ],
     )
 
 
@@ -165,11 +152,6 @@ def for_a_page(answer: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return shown
 
 
-def without_options(table: dict[str, Any]) -> dict[str, Any]:
-    """The table with a title that names no option."""
-    return table | {"title": _IN_A_TITLE.sub("", table["title"])}
-
-
 def _stands_in(answer: Sequence[dict[str, Any]], table: dict[str, Any]) -> bool:
     """Whether the answer holds the table: the same heads, and in each row the same first cell."""
     firsts = [str(row[0]) for row in table["rows"] if row]
@@ -183,8 +165,8 @@ def _stands_in(answer: Sequence[dict[str, Any]], table: dict[str, Any]) -> bool:
 
 _LEAST_DEG = 1e-3
 
-# Headline numbers shown where the command names none.
-_CARDS = 6
+# Headline numbers shown where the command names none, and what a page shows of every metric.
+_CARDS, _KEPT = 6, ("value", "unit", "better", "n", "meaning")
 
 # Figures of a page: name, caption and data URL.
 Figures = list[tuple[str, str, str]]
@@ -194,16 +176,8 @@ Part = TypeVar("Part")
 def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undrawn | None = None) -> str:
     """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed.
 
-    Parameters
-    ----------
-    run
-        Run directory.
-    manifest
-        Its manifest, in which `undrawn` may note more.
-    beside
-        Folder of figures that were drawn later.
-    undrawn
-        Called for a part that cannot be drawn, which is then left out. Without it the part's error is raised.
+    `beside` is a folder of figures that were drawn later. `undrawn` is called for a part that cannot be drawn, which is
+    then left out, and may note more in the manifest; without it the part's error is raised.
     """
 
     def part(name: str, draw: Callable[[], Part], default: Part) -> Part:
@@ -232,8 +206,10 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
         verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
         answer=answer,
         headline=headline(run.metrics, overview.cards, manifest.state == "ok"),
-        metrics=_metrics(run),
-        tables=[without_options(table) for table in results if not _stands_in(answer, table)],
+        metrics=[(name, *map(_for_people(metric).get, _KEPT)) for name, metric in run.metrics.items()],
+        tables=[
+            table | {"title": _IN_A_TITLE.sub("", table["title"])} for table in results if not _stands_in(answer, table)
+        ],
         figures=[picture for picture in drawn if picture not in first],
         first=first,
         later=[caption or name for name, caption in overview.captions.items() if name not in known],
@@ -271,9 +247,8 @@ def _templates() -> Environment:
     environment.filters["cell"], environment.filters["words"] = _cell, metric_in_words
     scripts = [environment.get_template(script.name).render().encode() for script in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
-    environment.globals["allowed"] = " ".join(
-        f"'sha256-{digest}'" for digest in hashes
-    )  # no other script runs in a page
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)  # no other script runs in a page
+    environment.globals["allowed"] = allowed
     return environment
 
 
@@ -323,12 +298,6 @@ def headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str], ended: bo
 def _for_people(metric: dict[str, Any]) -> dict[str, Any]:
     value, unit = in_degrees(metric["value"], metric.get("unit") or "")
     return metric | {"value": value, "unit": unit}
-
-
-def _metrics(run: Run) -> list[tuple[Any, ...]]:
-    kept = ("value", "unit", "better", "n", "meaning")
-    shown = {name: _for_people(metric) for name, metric in run.metrics.items()}
-    return [(name, *(metric.get(key) for key in kept)) for name, metric in shown.items()]
 
 
 def _provenance(manifest: Manifest) -> list[tuple[str, str]]:

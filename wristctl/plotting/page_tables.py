@@ -64,23 +64,15 @@ def _in_one(run: Run, stored: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     if not of_loops:
         return list(stored)
     shown = [name for name in frame.columns if name in METRICS and METRICS[name].heading and frame[name].notna().any()]
-    heads = [_head(name, in_degrees(None, METRICS[name].unit)[1]) for name in shown]
+    units = {name: in_degrees(None, METRICS[name].unit)[1] for name in shown}
+    heads = [metric_in_words(name) + f" [{unit}]" * (unit not in ("", "1")) for name, unit in units.items()]
     many = frame["inverse"].nunique() > 1
     columns = ["loop", "motion", "controller", *["inverse"] * many, *heads, "verdict"]
-    rows = [
-        _row(entry, {name: METRICS[name].unit for name in shown}, many, verdicts)
-        for entry in frame.astype(dict.fromkeys(_WHO, str)).to_dict("records")
-    ]
+    rows = []
+    for entry in frame.astype(dict.fromkeys(_WHO, str)).to_dict("records"):
+        loop, reference, controller, gains, inverse = (entry[name] for name in _WHO)
+        label = f"{controller}/{gains}"
+        values = [in_degrees(float(entry[name]), METRICS[name].unit)[0] for name in shown]
+        verdict = verdicts.get((loop, reference, label, inverse)) or ("failed" if entry["failed"] else "ok")
+        rows.append([loop, reference, label, *[inverse] * many, *values, verdict])
     return [{"title": "", "columns": columns, "rows": rows}, *others]
-
-
-def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dict[tuple[str, ...], str]) -> list[Any]:
-    loop, motion, controller, gains, inverse = (entry[name] for name in _WHO)
-    label = f"{controller}/{gains}"
-    values = [in_degrees(float(entry[name]), unit)[0] for name, unit in units.items()]
-    verdict = verdicts.get((loop, motion, label, inverse)) or ("failed" if entry["failed"] else "ok")
-    return [loop, motion, label, *[inverse] * many, *values, verdict]
-
-
-def _head(name: str, unit: str) -> str:
-    return f"{metric_in_words(name)} [{unit}]" if unit and unit != "1" else metric_in_words(name)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from wristctl.comparison.bootstrap import penalised
-from wristctl.comparison.controller_ranking import Ranking, probability_of_less
+from wristctl.comparison.controller_ranking import Ranking, labels_of, probability_of_less
 from wristctl.comparison.tie_groups import performance_profiles
 from wristctl.plotting.kinds import UNUSABLE, Dot, draw_cells, draw_dots, name_rows
 from wristctl.plotting.style import (
@@ -48,7 +48,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     what must not be used. `places` are the words of each condition by the ranking's name.
     """
     most = max(len(ranking.labels) for ranking in rankings)
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     marks = _marks(labels)
     picture, ((axes,),) = figure(height=1.4 + len(rankings) * (0.25 + 0.055 * most))
     for band, ranking in enumerate(rankings):
@@ -72,11 +72,9 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     alone = "o" if len(marks) > 1 else next(iter(marks.values()))
     handles = [Line2D([], [], marker=alone, color=colour(name), label=called(name), **every) for name in names]
-    handles += [
-        Line2D([], [], marker=mark, color=GREY, markerfacecolor="none", label=_gains_words(gains), **every)
-        for gains, mark in marks.items()
-        if len(marks) > 1
-    ]
+    for gains, mark in marks.items() if len(marks) > 1 else ():  # hollow: a full grey mark is a controller
+        words = f"{gains} gains" if gains else "preset by loop"
+        handles.append(Line2D([], [], marker=mark, color=GREY, markerfacecolor="none", label=words, **every))
     if any(ranking.standing.unusable for ranking in rankings):
         handles.append(Line2D([], [], linestyle="none", label="must not be used", **UNUSABLE))
     legend_under(picture, handles, 3)
@@ -89,12 +87,7 @@ def _dot(ranking: Ranking, row: int, place: float, mark: Mapping[str, Any], case
     points = np.degrees(scores[np.isfinite(scores)]) if cases else scores[:0]
     value, low, high = np.degrees([mean.value, mean.low, mean.high]).tolist()
     mark = UNUSABLE if row in ranking.standing.unusable else mark
-    return Dot(place, value, colour(ranking.labels[row].split("/")[0]), (low, high), points, mark)
-
-
-def _gains_words(gains: str) -> str:
-    """Gains in a legend, whose mark is hollow: a full grey one is a controller."""
-    return f"{gains} gains" if gains else "preset by loop"
+    return Dot(place, value, colour(ranking.labels[row]), (low, high), points, mark)
 
 
 def _marks(labels: Sequence[str]) -> dict[str, str]:
@@ -127,9 +120,8 @@ def performance_profile(rankings: Sequence[Ranking], places: Mapping[str, str]) 
     Drawn are the best two of each ranking and feedforward. What fails in a case is within no factor.
     """
     picture, panels = _panels(rankings, 1.9, 0.95, sharex=True, sharey=True)
-    shown = _often_first(rankings)[: _SHOWN - 1]
-    shown += [one.labels[one.yardstick] for one in rankings if one.yardstick is not None]
-    shown = list(dict.fromkeys(shown))
+    yardsticks = [one.labels[one.yardstick] for one in rankings if one.yardstick is not None]
+    shown = list(dict.fromkeys([*_often_first(rankings)[: _SHOWN - 1], *yardsticks]))
     for panel, ranking in zip(panels, rankings, strict=True):
         scores = np.where(np.isfinite(ranking.scores), penalised(ranking.scores), np.inf)
         shares = performance_profiles(scores, _FACTORS)
@@ -179,7 +171,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
             told = np.isfinite(inverse.high) and inverse.low > 0.0
             ends = (1.0 / inverse.high, 1.0 / inverse.low) if told else (np.nan, np.nan)
             mark = UNUSABLE if row in ranking.standing.unusable else {"marker": "D"}
-            shade = colour(label.split("/")[0])
+            shade = colour(label)
             dots.append(Dot(height, 1.0 / inverse.value, shade, ends, scores[row] / scores[base], mark))
         draw_dots(panel, dots, size=3.5)
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
@@ -205,7 +197,7 @@ def _by_mean_ratio(rankings: Sequence[Ranking], baseline: str) -> list[str]:
     """Labels by the mean logarithm of their ratio to the baseline, the least first; without the baseline itself."""
     ratios: dict[str, list[float]] = {}
     for ranking in rankings:
-        base = ranking.means[ranking.labels.index(baseline)].value
+        base = ranking.of_label(baseline).value
         for label, mean in zip(ranking.labels, ranking.means, strict=True):
             if label != baseline:
                 ratios.setdefault(label, []).append(np.log(mean.value / base))

@@ -14,11 +14,7 @@ _COLUMNS = 3
 def residuals_over_time(logged: Logged, stop: StopTick | None, last: float | None = None) -> Figure:
     """Every residual [its unit] over the run's clock [s], with +- its limit; the tick that stopped the run marked.
 
-    Parameters
-    ----------
-    logged : residuals and limits of the run
-    stop : the tick that stopped it
-    last : seconds before the stop, or the end, that are drawn; None: all
+    With `last` only so many seconds before the stop, or the end, are drawn.
     """
     values = logged.values if stop is None else logged.values.iloc[: stop.row + 1]
     if last is not None:

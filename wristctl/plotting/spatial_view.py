@@ -5,7 +5,6 @@ Axes as everywhere: x along the straight wrist, y toward ulnar, z toward flexion
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from functools import partial
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
+from wristctl.plotting.animation import columns_of
 from wristctl.plotting.style import (
     BLACK,
     GREEN,
@@ -95,9 +95,10 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         "tip_desired": ([f"tip_desired_{axis}" for axis in "xyz"], PLACE),
     }
     columns = ["time", *(name for names, _ in groups.values() for name in names)]
-    table = _simulated(run, columns) if run.kind == "simulate" else _performed(run, columns)
-    if table is None:
+    known = columns_of(run, "bends") if run.kind == "simulate" else _performed(run, columns)
+    if known is None:
         return None
+    table = np.stack([known[name] for name in columns], axis=1)
     sound = np.isfinite(table).all(axis=1)
     table = table[: len(table) if sound.all() else int(np.argmin(sound))]
     if len(table) < 2:
@@ -131,16 +132,8 @@ def _numbers(run: Run, count: int) -> Sequence[int]:
     return numbers_of(layout_of_rig(run.config.hw_run, run.config.wrist))
 
 
-def _simulated(run: Run, columns: list[str]) -> Array:
-    """Columns of a loop in two planes, (T, columns)."""
-    with run.file("data/bends.csv").open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
-        heads, *rows = csv.reader(lines)
-    at = [heads.index(name) for name in columns]
-    return np.array([[float(row[column] or "nan") for column in at] for row in rows])
-
-
-def _performed(run: Run, columns: list[str]) -> Array | None:
-    """The same of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
+def _performed(run: Run, columns: list[str]) -> dict[str, Array] | None:
+    """Columns of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
     if run.config.hw_run.planes == 1:
         return None
     from wristctl.trial.trial_results import first_course
@@ -153,7 +146,7 @@ def _performed(run: Run, columns: list[str]) -> Array | None:
     known = course.segment_theta.shape[1]
     if known < segments:  # of a real wrist one arc is all that is seen
         of_course |= {name: of_course[f"bend_1_{name[7:]}"] * known / segments for name in columns[1 : 1 + segments]}
-    return np.stack([of_course[name] for name in columns], axis=1)
+    return of_course
 
 
 def seen(points: Array) -> Array:

@@ -30,56 +30,35 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 # Colours of tendons by their numbers, from the first.
 TENDON_COLOURS = (BLUE, VERMILLION, ORANGE, PURPLE, GREY, BLACK)
 # From Tol's muted scheme, for what Okabe and Ito's eight do not reach.
-INDIGO, WINE, OLIVE, BLACK, ROSE = "#332288", "#882255", "#999933", "#000000", "#CC6677"
+INDIGO, WINE, OLIVE, ROSE = "#332288", "#882255", "#999933", "#CC6677"
 
 # Width of a figure [in]; text is 9 to 10 points.
 WIDTH = 7.0
 
+# Colour of each controller, and what it is, in words that stand beside its name.
 _CONTROLLERS = {
-    "smc": BLUE,
-    "pid": VERMILLION,
-    "mrac": ORANGE,
-    "gvsc": SKY,
-    "nc": PURPLE,
-    "smc-tracking": INDIGO,
-    "super-twisting": WINE,
-    "computed-torque": GREEN,
-    "feedforward": GREY,
-    "ct-dob": "#1b7837",
-    "mpc": "#8c510a",
-    "clf-qp": "#01665e",
-    "adrc": "#c51b7d",
-    "lqi": "#35978f",
-    "nn-mrac": "#bf812d",
-    "impedance": "#80cdc1",
-    "fopi": "#d6604d",
-    "ilc": "#dfc27d",
-    "pd-ff": "#9970ab",
-    "pid-ff": "#5aae61",
-    "pid-dob": "#4575b4",
-    "smc-dob": "#762a83",
-}
-# What controllers are, in words that stand beside their names.
-_IN_WORDS = {
-    "smc": "sliding mode",
-    "mrac": "model reference adaptive",
-    "gvsc": "variable strain",
-    "nc": "neuro-controller",
-    "smc-tracking": "tracking sliding mode",
-    "feedforward": "open loop",
-    "ct-dob": "computed torque, observer",
-    "mpc": "model predictive",
-    "clf-qp": "control Lyapunov function",
-    "adrc": "disturbance rejection",
-    "lqi": "linear quadratic",
-    "nn-mrac": "adaptive network",
-    "impedance": "impedance, network",
-    "fopi": "fractional PI",
-    "ilc": "iterative learning",
-    "pd-ff": "PD, feedforward",
-    "pid-ff": "PID, feedforward",
-    "pid-dob": "PID, observer",
-    "smc-dob": "sliding mode, observer",
+    "smc": (BLUE, "sliding mode"),
+    "pid": (VERMILLION, ""),
+    "mrac": (ORANGE, "model reference adaptive"),
+    "gvsc": (SKY, "variable strain"),
+    "nc": (PURPLE, "neuro-controller"),
+    "smc-tracking": (INDIGO, "tracking sliding mode"),
+    "super-twisting": (WINE, ""),
+    "computed-torque": (GREEN, ""),
+    "feedforward": (GREY, "open loop"),
+    "ct-dob": ("#1b7837", "computed torque, observer"),
+    "mpc": ("#8c510a", "model predictive"),
+    "clf-qp": ("#01665e", "control Lyapunov function"),
+    "adrc": ("#c51b7d", "disturbance rejection"),
+    "lqi": ("#35978f", "linear quadratic"),
+    "nn-mrac": ("#bf812d", "adaptive network"),
+    "impedance": ("#80cdc1", "impedance, network"),
+    "fopi": ("#d6604d", "fractional PI"),
+    "ilc": ("#dfc27d", "iterative learning"),
+    "pd-ff": ("#9970ab", "PD, feedforward"),
+    "pid-ff": ("#5aae61", "PID, feedforward"),
+    "pid-dob": ("#4575b4", "PID, observer"),
+    "smc-dob": ("#762a83", "sliding mode, observer"),
 }
 _OTHERS = (OLIVE, BLACK, ROSE)
 # Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own.
@@ -161,8 +140,11 @@ def figure(
         tall, width = tall * max(0.85, min(1.0, paper / width)), paper
     picture = Figure(figsize=(width, tall), layout="constrained")
     axes = picture.subplots(rows, cols, squeeze=False, **subplots)
-    for panel in axes.flat:
-        dress(panel)
+    for panel in axes.flat:  # set on the axes itself: ticks are made when drawn, outside any rc context
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(which="both", labelsize=9.0)
+        panel.grid(True, color=LIGHT, linewidth=0.6)
+        panel.set_axisbelow(True)
     return picture, axes
 
 
@@ -178,14 +160,6 @@ def grid(count: int, columns: int, height: float, **options: Any) -> tuple[Figur
     for panel in panels[count:]:
         panel.set_visible(False)
     return picture, panels[:count]
-
-
-def dress(axes: Axes) -> None:
-    """Open frame and pale grid, set on the axes itself: ticks are made when drawn, outside any rc context."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(which="both", labelsize=9.0)
-    axes.grid(True, color=LIGHT, linewidth=0.6)
-    axes.set_axisbelow(True)
 
 
 def undress(axes: Axes) -> None:
@@ -273,14 +247,16 @@ def _letters(width: float) -> float:
     return _SMALLEST if _PAPER.get() is not None and width < _PRINTED else 1.0
 
 
-def colour(controller: str) -> str:
-    """The controller's colour, the same in every figure; one without its own gets a colour by its name."""
-    return _CONTROLLERS.get(controller) or _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
+def colour(label: str) -> str:
+    """Colour of a controller, or of "controller/gains", in every figure; one without its own has one by its name."""
+    controller = label.partition("/")[0]
+    known = _CONTROLLERS.get(controller)
+    return known[0] if known else _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
 
 
 def controller_in_words(controller: str) -> str:
     """The controller's name, and what it is: smc (sliding mode)."""
-    words = _IN_WORDS.get(controller)
+    _, words = _CONTROLLERS.get(controller, ("", ""))
     return f"{controller} ({words})" if words else controller
 
 

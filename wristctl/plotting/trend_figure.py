@@ -11,13 +11,7 @@ _COLUMNS = 2
 
 
 def trends_over_runs(trends: Sequence[Trend], axis: str) -> Figure:
-    """Values of every quantity with its line, red where it drifts.
-
-    Parameters
-    ----------
-    trends : lines of the quantities
-    axis : what they run over, with its unit
-    """
+    """Values of every quantity over `axis`, which has its unit, with its line, red where it drifts."""
     picture, panels = grid(len(trends), _COLUMNS, 1.8)
     for panel, trend in zip(panels, trends, strict=True):
         line = trend.values.mean() + trend.slope * (trend.places - trend.places.mean())

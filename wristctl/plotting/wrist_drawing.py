@@ -39,11 +39,9 @@ from wristctl.wrist.kinematics import Planar, discs, offset_points
 RIM = 1.25
 
 
-def draw_wrist(
-    axes: Axes, q: Array, wrist: WristParameters, pulling: int = 0, edge_on: bool = False, plant: str = "pcc"
-) -> None:
-    """Draw the wrist at its plant's coordinates (q,); `pulling` is the sign of the side whose tendons pull."""
-    backbone = PLANTS[plant].backbone
+def draw_wrist(axes: Axes, q: Array, wrist: WristParameters, pulling: int = 0, edge_on: bool = False) -> None:
+    """Draw the wrist as arcs of angles (q,); `pulling` is the sign of the side whose tendons pull."""
+    backbone = PLANTS["pcc"].backbone
     frames = discs(backbone, q, wrist)
     c, centres, normals = wrist.tendon_offset, *frames
     for outline in hand(wrist.hand_offset, edge_on) if wrist.hand_offset > 0.0 else []:
@@ -65,13 +63,13 @@ def draw_wrist(
     _frame(axes)
 
 
-def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Figure:
-    """The wrist bent by `angle` [rad] in the four directions, with the tendons that pull; cross-sections below."""
+def directions(wrist: WristParameters) -> Figure:
+    """The wrist bent by 30 deg in the four directions, with the tendons that pull; cross-sections below."""
     picture, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
     reach = 1e3 * (wrist.length + 2.0 * wrist.hand_offset)
     between = " " if columns_within(4, 1.2) == 4 else "\n"
     for direction, above, below in zip(DIRECTIONS.values(), *axes, strict=True):
-        theta, (first, second) = direction.sign * angle, direction.tendons
+        theta, (first, second) = math.radians(30.0 * direction.sign), direction.tendons
         draw_wrist(above, np.array([theta]), wrist, direction.sign, direction.plane == "flexion")
         title(above, f"{direction.name}, {math.degrees(theta):+.3g} deg\ntendons {first} and {second} pull")
         above.set_xlim(sorted((-0.22 * reach * direction.sign, 0.58 * reach * direction.sign)))

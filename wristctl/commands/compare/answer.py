@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.commands.printed_table import Table, capital, joined
 from wristctl.commands.ranking_answer import (
     PRINTED,
@@ -22,14 +24,17 @@ from wristctl.commands.ranking_answer import (
     recommended,
     winner,
 )
-from wristctl.commands.ranking_drawing import keep_error
-from wristctl.commands.ranking_tables import controllers_table
+from wristctl.commands.ranking_tables import controllers_table, keep_error
 from wristctl.commands.results import Findings
-
-if TYPE_CHECKING:
-    from wristctl.comparison.combinations import ComparedRow
-    from wristctl.comparison.controller_ranking import Ranking, Traits
-    from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.combinations import CLASS_MEANINGS, ComparedRow
+from wristctl.comparison.controller_ranking import Ranking, labels_of
+from wristctl.comparison.paper import T2, verdict
+from wristctl.comparison.repetition_spread import spread
+from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.tie_groups import share
+from wristctl.comparison.world_ranking import WorldRanking
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.trajectory import rests
 
 
 def answer_of(
@@ -41,18 +46,9 @@ def answer_of(
 ) -> Answer | None:
     """The answer of a comparison for one screen; None where nothing was compared.
 
-    Parameters
-    ----------
-    rankings
-        Rankings of the controllers under each condition.
-    run
-        Path of the run; empty for a result in memory.
-    gains
-        Gains by name, in SI units, of every row by its label.
-    bending
-        Planes that all loops bend in, a sentence; empty where they stay in one.
-    asked
-        Labels of controllers that the table has, however many others there are.
+    `run` is its path, empty for a result in memory; `gains` are those of every row by its label, in SI units; `bending`
+    says in which planes all loops bend, where these are two; the table has the labels that were `asked` for, however
+    many others there are.
     """
     if not rankings:
         return None
@@ -78,11 +74,6 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
 
     Empty where the worlds are no draws of an identification's posterior.
     """
-    import numpy as np
-
-    from wristctl.comparison.tie_groups import share
-    from wristctl.comparison.world_ranking import WorldRanking
-
     posteriors = [one for one in rankings if isinstance(one, WorldRanking) and one.family.together]
     sentences = []
     for ranking in posteriors:
@@ -102,7 +93,7 @@ def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[st
     """Which preset a controller has under which condition that was typed by its name alone; empty where none was."""
     rig = {condition(one): one.traits.rig for one in rankings}
     usual = [preset for preset, wanted in (("hardware", True), ("default", False)) if wanted in rig.values()]
-    alone = dict.fromkeys(label for one in rankings for label in one.labels if is_by_loop(label))
+    alone = list(filter(is_by_loop, labels_of(rankings)))
     presets = [row.split("/", 1) for row, values in gains.items() if values and "/" in row]
     own = {label: [preset for name, preset in presets if name == label] for label in alone}
     others = [f"{label} {preset}" for label, found in own.items() for preset in found if preset not in usual]
@@ -118,7 +109,7 @@ def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[st
 
 def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
     """Gains of the controllers that are recommended, with units; empty where they have none or are not known."""
-    everyone = {label for ranking in rankings for label in ranking.labels}
+    everyone = labels_of(rankings)
     listed = [
         f"{row} has {gains_words(row.split('/')[0], gains[row])}"
         for label in recommended(rankings)
@@ -130,20 +121,15 @@ def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, 
 
 def conditions(rankings: Sequence[Ranking]) -> str:
     """What the names of the conditions mean; empty for families of worlds, which a study describes."""
-    from wristctl.comparison.combinations import CLASS_MEANINGS
-
     meanings = dict[str, str]()
     for one in rankings:
         if one.unit != "world":
             name, words = one.name.removesuffix(", steps"), condition(one).removesuffix(" (steps)")
-            meanings[words] = _rig(one.traits) if name == "camera and tendons" else CLASS_MEANINGS[name]
+            rig = "angles come from pictures" if one.traits.camera else "of some loops"
+            if one.traits.tendons:
+                rig = "spools follow the reference, so even low gains track it"
+            meanings[words] = rig if name == "camera and tendons" else CLASS_MEANINGS[name]
     return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
-
-
-def _rig(traits: Traits) -> str:
-    if traits.tendons:
-        return "spools follow the reference, so even low gains track it"
-    return "angles come from pictures" if traits.camera else "of some loops"
 
 
 # For what presets were made; those of the paper are told apart.
@@ -163,7 +149,7 @@ def gains_meant(rankings: Sequence[Ranking]) -> str:
 
 def papers(rankings: Sequence[Ranking]) -> str:
     """What becomes of the paper's printed gains, and of P1 and P2 exchanged, condition by condition."""
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    labels = labels_of(rankings)
     sentences = [
         f"{label}{explained} {_outcomes(rankings, label)}"
         for gains, explained in ((PRINTED, ""), ("exchanged", " (P1, P2)"))
@@ -197,8 +183,6 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
 
 def papers_order(rankings: Sequence[Ranking]) -> str:
     """Whether the order of the paper's five controllers by RMSE is that of their best rows here."""
-    from wristctl.comparison.paper import T2
-
     printed = sorted(T2, key=lambda name: T2[name].rmse)
     holds, complete = [], 0
     for ranking in rankings:
@@ -238,8 +222,6 @@ STANDING_UNITS = dict.fromkeys(("rmse", "rmse_low", "rmse_high", "swing"), "rad"
 
 def units() -> dict[str, str]:
     """Units of the columns of the comparison table, by name."""
-    from wristctl.simulation.metrics import METRICS
-
     metric_units = {name: metric.unit or "1" for name, metric in METRICS.items()}
     ends = {f"{name}_{end}": unit for name, unit in metric_units.items() for end in ("low", "high")}
     return metric_units | ends | {"paper_rmse": "rad", "paper_settling": "s", "paper_steady_state": "rad"}
@@ -251,9 +233,6 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
     The paper's numbers stand in those of the `cells` (loop, reference) alone; a motion that never rests has neither
     settling time nor overshoot.
     """
-    from wristctl.simulation.metrics import METRICS
-    from wristctl.simulation.trajectory import rests
-
     shown = {name: METRICS[name].heading for name in dict.fromkeys((*_FIRST, *METRICS)) if METRICS[name].heading}
     times = max(len(result.repeated.failed) for result in results)
     ends = ("RMSE's 95 % low", "high") if times > 1 else ()
@@ -270,15 +249,15 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
 
 
 def _row(result: ComparedRow, shown: Iterable[str], repeated: bool, theirs: bool) -> tuple[str | float, ...]:
-    from wristctl.commands.compare.csv_data import metrics_of
-    from wristctl.comparison.repetition_spread import spread
-
-    metrics = metrics_of(result)
-    never = "failed" if result.repeated.failed.any() else "never"
-    settling = metrics["settling"] if metrics["settling"] == metrics["settling"] else never
-    values = [settling if name == "settling" else metrics[name] for name in shown]
+    metrics: dict[str, str | float] = dict(found := metrics_of(result))
+    if found["settling"] != found["settling"]:
+        metrics["settling"] = "failed" if result.repeated.failed.any() else "never"
     ends = spread(result.repeated.metrics["rmse"])[1:3] if repeated else ()
-    papers = _paper(result) if theirs else ()
+    papers: tuple[str, ...] = ("", "") if theirs else ()
+    if theirs and result.controller in T2:
+        printed = " / ".join(f"{value:g}" for value in T2[result.controller])
+        papers = printed, verdict(result.controller, found["rmse"], found["settling"], found["steady_state"])
+    values = (metrics[name] for name in shown)
     return (result.label, result.inverse, *values, *ends, *papers, result.repeated.fate)
 
 
@@ -286,14 +265,3 @@ def step_table(times: dict[str, StepTime]) -> Table:
     """Table of the time of a control step on this machine [us]."""
     rows = [(label, time.median, time.p99) for label, time in times.items()]
     return Table("Control step of one wrist on this machine", ("controller", "median [us]", "p99 [us]"), rows)
-
-
-def _paper(result: ComparedRow) -> tuple[str, str]:
-    from wristctl.commands.compare.csv_data import metrics_of
-    from wristctl.comparison.paper import T2, verdict
-
-    if result.controller not in T2:
-        return "", ""
-    metrics = metrics_of(result)
-    printed = " / ".join(f"{value:g}" for value in T2[result.controller])
-    return printed, verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"])

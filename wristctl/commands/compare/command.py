@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.compare.answer import (
-    STANDING_UNITS,
-    answer_of,
-    head_with_the_best,
-    loop_tables,
-    step_table,
-    units,
-)
-from wristctl.commands.compare.ranking import ranked
-from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
     check_family_reach,
@@ -37,25 +26,13 @@ from wristctl.commands.inputs_of_loops import (
     why_two_planes,
     with_what_there_is,
 )
-from wristctl.commands.loop_warnings import (
-    asked_by,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_of_earlier_families,
-    warn_of_lost,
-    warn_of_one_plane,
-    warn_out_of_reach,
-)
+from wristctl.commands.loop_warnings import warn_of_earlier_families, warn_of_loops, warn_of_lost
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.ranking_answer import condition
-from wristctl.commands.ranking_drawing import draw_rankings
-from wristctl.commands.ranking_tables import answer_tables, every_row
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts, timed_steps
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search
-from wristctl.commands.tune.searches import search_all
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
@@ -74,88 +51,6 @@ if TYPE_CHECKING:
     from wristctl.control.table import Gains
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
-
-
-def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings: Sequence[Ranking]) -> None:
-    """Draw each condition, RMSE against tension variation and over a growing setting, and every row on every loop."""
-    from wristctl.commands.compare.class_figures import error_against_variation
-    from wristctl.commands.compare.figures import error_over_disturbance, series_of_sizes
-
-    draw_rankings(findings, rankings, later=True)
-    for ranking in rankings:
-        _of_class(findings, ranking, results)
-    later = partial(findings.figure, later=True)
-    first = [result for result in results if result.inverse == _stands_for(results)[2]]
-    caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
-    later("rmse-against-tension-variation", error_against_variation, first, rankings, caption=caption)
-    for leaf, sizes in series_of_sizes(study.compare.loops).items():
-        caption = f"RMSE over {leaf}, medians over motions"
-        later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
-    _of_every_row(findings, study, results)
-
-
-def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
-    """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
-    from wristctl.commands.compare.class_figures import shown_rows, tension_rows
-    from wristctl.plotting.bend_figure import bend_overlay
-    from wristctl.plotting.loop_figures import over_time, spread_of_sizes
-
-    later = partial(findings.figure, later=True)
-    cell = _stands_for(ranking.of(results))
-    by_label = {result.label: result for result in results if (result.loop, result.reference, result.inverse) == cell}
-    shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
-    courses = [result.simulation.trajectory for result in shown]
-    slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
-    caption = f"Angle and error of the best controllers and of the paper's, {where}"
-    if courses[0].planes == 1:
-        parts: dict[str, Any] = {"heading": where, "later": ranking.jumps, "caption": caption}
-        findings.figure(f"overlay-{slug}", over_time, courses, "angle", "measurable size", **parts)
-    else:
-        findings.figure(f"overlay-{slug}", bend_overlay, courses, where, later=ranking.jumps, caption=caption)
-    caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
-    later(f"error-over-time-{slug}", over_time, courses, "size", heading=where, caption=caption)
-    tendons = "both sides" if courses[0].planes == 1 else "each tendon"
-    later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
-    repeated = [result.repeated for result in shown if len(result.repeated.failed) > 1]
-    if repeated:
-        caption = f"|error| over repetitions: median and 95 % interval, {where}"
-        later(
-            f"error-of-repetitions-{slug}",
-            over_time,
-            courses[:1],
-            spread_of_sizes(repeated),
-            heading=where,
-            caption=caption,
-        )
-
-
-def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRow]) -> None:
-    from wristctl.commands.compare.figures import rmse_map, variation_dots
-    from wristctl.comparison.combinations import paper_cells
-
-    later, cells, settings = partial(findings.figure, later=True), paper_cells(study), study.compare
-    for loop in settings.loops:
-        selected = [result for result in results if result.loop == loop]
-        beside = any(cell[0] == loop for cell in cells)
-        caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
-        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, selected, f"loop {loop}", beside=beside, caption=caption)
-        caption = f"Total variation of tension of every row, loop {loop}"
-        later(f"tension-variation-{_slug(loop)}", variation_dots, selected, f"loop {loop}", caption=caption)
-    for reference in dict.fromkeys(result.reference for result in results) if len(settings.loops) > 1 else ():
-        selected = [result for result in results if result.reference == reference]
-        caption = f"RMSE of every row on each loop, {reference}"
-        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, selected, reference, "loop", beside=False, caption=caption)
-
-
-def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
-    """The loop, reference and inverse of the first row that is no step and, if there are others, not of a network."""
-    chosen = min(results, key=lambda result: (result.inverse == "network", result.jumps))
-    return chosen.loop, chosen.reference, chosen.inverse
-
-
-def _slug(name: str) -> str:
-    """Name of a file made from a title."""
-    return re.sub(r"[^A-Za-z0-9.-]+", "-", name.replace(" -", " minus ").replace("+", "plus ")).strip("-")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -188,6 +83,8 @@ class Compared(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
+        from wristctl.commands.compare.answer import answer_of
+
         bending = why_two_planes(self.study.wrist, asked_of_comparison(self.study))
         own = [row.label for row in self.study.compare.rows if CONTROLLERS.origin(row.controller)]
         typed = [row.label for row in self.study.compare.rows if row.gains == BY_LOOP]
@@ -196,6 +93,8 @@ class Compared(StudyResult):
     @property
     def marks(self) -> list[str]:
         """Conditions in which no controller can be used, or none is ranked for want of cases."""
+        from wristctl.commands.ranking_answer import condition
+
         unranked = [ranking for ranking in self.rankings if not ranking.standing.groups and not ranking.jumps]
         few = [condition(ranking) for ranking in unranked if ranking.standing.untold]
         none = [condition(ranking) for ranking in unranked if not ranking.standing.untold]
@@ -275,8 +174,12 @@ def size(study: Study) -> Size:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
+    from wristctl.commands.compare.answer import STANDING_UNITS, head_with_the_best, loop_tables, step_table, units
     from wristctl.commands.compare.csv_data import frame, repetitions_frame, series
+    from wristctl.commands.compare.drawing import draw, ranked
+    from wristctl.commands.ranking_tables import answer_tables, draw_rankings, every_row
     from wristctl.commands.truth_table import truth_tables
+    from wristctl.commands.tune.searches import search_all
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.combinations import paper_cells
     from wristctl.comparison.controller_ranking import class_rankings, standings_frame
@@ -291,11 +194,8 @@ def compare(session: Session) -> Compared:
         log.warning("left out: %s", "; ".join(left_out))
     settings = study.compare
     loops = judged_loops(study, study.compare).values()
-    warn_if_it_buckles(findings, study.wrist, loops)
-    warn_if_coarse(loops)
     warn_of_earlier_families(settings.rows)
-    warn_of_one_plane(study.wrist, asked_of_comparison(study))
-    warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
+    warn_of_loops(findings, study, settings, asked_of_comparison(study))
     network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
     if settings.tuning is not None:
         tuning = study.model_copy(update={"tune": settings.tuning})
@@ -373,11 +273,7 @@ COMPARE = sweepable(
         "compare",
         plan,
         compare,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("tuned", kind="tune", optional=True),
-            FROM_IDENTIFIED,
-        ),
+        (NETWORK, TUNED, FROM_IDENTIFIED),
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_comparison(study)),
     )

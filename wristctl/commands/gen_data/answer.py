@@ -46,23 +46,17 @@ CLOSED_FORM = {1: "2 atan2(y, x)", 2: "2 atan2(hypot(y, z), x) toward (y, z)"}
 class Measured(NamedTuple):
     """What was read of recordings."""
 
-    recordings: int
-    """Recordings with samples."""
     samples: int
     """Rows with all of tip, angle and further inputs."""
-    left_out: int
-    """Rows without some of these."""
-
-    @property
-    def left_out_words(self) -> str:
-        """How many rows were left out, in brackets; empty where none was."""
-        return f" (left out: {counted(self.left_out, 'row')} without a tip or an angle)" if self.left_out else ""
+    recordings: str
+    """How many have samples, and how many rows were left out, in words."""
 
 
 def measured_of(courses: Sequence[RecordedCourse]) -> Measured:
     """What recordings have."""
-    counts = [len(course.theta) for course in courses]
-    return Measured(sum(count > 0 for count in counts), sum(counts), sum(course.left_out for course in courses))
+    counts, left_out = [len(course.theta) for course in courses], sum(course.left_out for course in courses)
+    words = f" (left out: {counted(left_out, 'row')} without a tip or an angle)" * bool(left_out)
+    return Measured(sum(counts), counted(sum(count > 0 for count in counts), "recording") + words)
 
 
 def counted(count: int, name: str) -> str:
@@ -87,9 +81,8 @@ def answer_of(
     count, planes = int(metrics["samples"]), 2 if "bend_max_deg" in metrics else 1
     source = ""
     if measured is not None:
-        named = counted(measured.recordings, "recording")
         chosen = "all" if measured.samples == count else f"drawn from the {measured.samples}"
-        source = f", {chosen} of {named}{measured.left_out_words}"
+        source = f", {chosen} of {measured.recordings}"
     low, high = (metrics[f"{QUANTITIES[planes][0]}_{end}_deg"] for end in ("min", "max"))
     ends = f"from {number(low)} to {number(high)} deg"
     why = f" ({why_two})" if why_two else ""

@@ -74,8 +74,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         whose = run.id if run else result
         measured = measured_of(courses)
         chosen = "all" if settings.samples is None else f"at most {settings.samples} of"
-        named = counted(measured.recordings, "recording")
-        return f"{chosen} {measured.samples} samples of {whose}, {named}{measured.left_out_words}"
+        return f"{chosen} {measured.samples} samples of {whose}, {measured.recordings}"
     within = f"within +-{wrist.range_deg:g} deg"
     if planes_of_study(study) == 2:
         within = f"in two planes by up to {wrist.range_deg:g} deg"

@@ -1,6 +1,8 @@
 """Rest positions of the wrist's tip over the range of the tendons' tension, by statics and not by geometry."""
 
+from collections.abc import Iterator
 from contextlib import suppress
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -19,7 +21,6 @@ from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendon_layout import TendonLayout
 
 SEGMENTS = 4
-_SOFTER, _STIFFER = 0.7, 1.3
 _TENSIONS, _DRAWN = 16, 5
 
 
@@ -62,25 +63,25 @@ def workspace(wrist: WristParameters, planes: int = 1) -> Figure:
     finite, limit = reach[np.isfinite(reach)], f"within {wrist.tension_limit:g} N"
     ends = f"from {finite.min():.3g} to {finite.max():.3g} deg" if len(finite) else "nowhere: it buckles"
     title(shape, f"the tip rests {ends} {limit}")
-    for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
-        stiffer = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
-        angle = np.degrees(rest_poses(stiffer, tension).sum(axis=1))
-        label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
-        curve.plot(tension, angle, style, color=BLUE if factor == 1.0 else GREY, label=label)
+    for stiffer, look in _stiffer(wrist):
+        curve.plot(tension, np.degrees(rest_poses(stiffer, tension).sum(axis=1)), **look)
     curve.set(xlabel="tension of the pulling side's tendons [N]", ylabel="bending angle at rest [deg]")
     legend(curve, loc="best")
     return picture
 
 
+def _stiffer(wrist: WristParameters) -> Iterator[tuple[WristParameters, dict[str, Any]]]:
+    """The wrist with softer springs, as it is believed and with stiffer ones, and the line style of each."""
+    for factor, style in ((0.7, "--"), (1.0, "-"), (1.3, ":")):
+        label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
+        look = {"linestyle": style, "color": BLUE if factor == 1.0 else GREY, "label": label}
+        yield wrist.model_copy(update={"stiffness": factor * wrist.stiffness}), look
+
+
 def _held_bends(wrist: WristParameters) -> Figure:
     layout = TendonLayout.of(wrist)
     picture, ((axes,),) = figure(height=4.6)
-    paths = []
-    for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
-        stiffer = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
-        label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
-        look = {"linestyle": style, "color": BLUE if factor == 1.0 else GREY, "label": label}
-        paths.append((reach_of_bends(stiffer, layout), look))
+    paths = [(reach_of_bends(stiffer, layout), look) for stiffer, look in _stiffer(wrist)]
     limit = f"{wrist.range_deg:g} deg held within {wrist.tension_limit:g} N"
     draw_plane_of_bends(axes, paths, f"bends of up to {limit}, and where each tendon pulls")
     for number, place in enumerate(layout.places, 1):

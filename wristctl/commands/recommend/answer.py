@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.ranking_answer import decided
-from wristctl.commands.recommend.candidate import ENOUGH, Candidate, share_of, spread
+from wristctl.commands.recommend.expected import ENOUGH, Candidate, Expected, share_of, spread
 from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
@@ -20,7 +19,6 @@ from wristctl.errors import UserError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.commands.recommend.expected import Expected
     from wristctl.commands.recommend.rehearsals import Rehearsal
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.trial.rehearsed import Rehearsed
@@ -108,9 +106,9 @@ class Recommended(StudyResult):
     @property
     def excess(self) -> dict[int, float]:
         """Of those of `near` that are sound in their rehearsal, in order, by how much they err more than the least."""
-        sound = [row for row in self.near if row in self.rehearsals and not self.rehearsals[row].fault]
-        others = [self.rehearsals[row] for row in sound]
-        return {row: self.rehearsals[row].excess(others) for row in sound}
+        sound = {row: self.rehearsals[row] for row in self.near if row not in self.untried}
+        sound = {row: rehearsal for row, rehearsal in sound.items() if not rehearsal.fault}
+        return {row: rehearsal.excess([*sound.values()]) for row, rehearsal in sound.items()}
 
     @property
     def untried(self) -> list[int]:
@@ -169,7 +167,7 @@ class Recommended(StudyResult):
     @property
     def marks(self) -> list[str]:
         """`nothing to recommend` where that is so."""
-        return [] if self.best is not None else ["nothing to recommend"]
+        return ["nothing to recommend"] * (self.best is None)
 
     def frame(self) -> pd.DataFrame:
         """A row for each candidate, best first; angles in rad."""
@@ -250,6 +248,8 @@ def _lost(ranked: WorldRanking, k: int) -> str:
 
 
 def _notes(result: Recommended) -> list[str]:
+    from wristctl.commands.ranking_answer import decided
+
     wanted = result.study.recommend.largest_deg
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     sides = "any side" if result.bending else "either side"

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import FROM_IDENTIFIED, Inputs
-from wristctl.commands.inputs_of_loops import identified, why_two_planes
+from wristctl.commands.inputs_of_loops import check_searched, identified, why_two_planes
 from wristctl.commands.kept_studies import gains_content, keep_study, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
 from wristctl.commands.procedure import Procedure
@@ -20,11 +20,7 @@ from wristctl.commands.recommend.answer import (
     files_table,
     sine_deg,
 )
-from wristctl.commands.recommend.candidate import Candidate, spread
-from wristctl.commands.recommend.expected import asked_for, expected
-from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
-from wristctl.commands.recommend.reach import FAMILY, LEAST_DEG, TOLERATED, asked_of_rigs, family_of_rigs, reach_deg
-from wristctl.commands.recommend.rehearsals import check_homing
+from wristctl.commands.recommend.expected import FAMILY, TOLERATED, Candidate, asked_for, expected, spread
 from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
@@ -58,17 +54,17 @@ _ALIKE = 1e-9
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controllers, and that the tendons reach what is asked for. Raises UserError."""
+    from wristctl.commands.recommend.own_rig import on_the_rig
+    from wristctl.commands.recommend.reach import LEAST_DEG, asked_of_rigs, family_of_rigs, reach_deg
+    from wristctl.commands.recommend.rehearsals import check_homing
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size
     from wristctl.simulation.planes import planes_of
-    from wristctl.tuning.search import check_tunable
 
     study = on_the_rig(identified(study, "recommend", inputs))
     settings = study.recommend
     with under("recommend"):
-        for number, name in enumerate(settings.controllers):
-            with under(f"controllers.{number}"):
-                check_tunable(controller(name))
+        check_searched(settings.controllers)
     reach = reach_deg(study)
     if reach < LEAST_DEG:
         reason = f"the tendons hold the wrist to {reach:g} deg only: no controller can help"
@@ -92,6 +88,9 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def recommend(session: Session) -> Recommended:
     """Scale presets to the wrist, tune each controller shortly, test all on rigs that no search has seen."""
+    from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
+    from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs, reach_deg
+    from wristctl.commands.recommend.rehearsals import check_homing
     from wristctl.control.table import controller
     from wristctl.simulation.drawn_worlds import streams_of
     from wristctl.tuning.scaled_presets import scaled_to
@@ -134,6 +133,8 @@ def recommend(session: Session) -> Recommended:
 
 def _reach_identified(study: Study, reach: float) -> float | None:
     """Angle [deg] that the tendons would hold, were they and the springs known; None where nobody asks for more."""
+    from wristctl.commands.recommend.reach import reach_deg
+
     settings = study.recommend
     if settings.rig is not None or reach >= math.floor(min(settings.largest_deg, study.wrist.range_deg)):
         return None
@@ -196,7 +197,7 @@ def _candidates(scaled: Sequence[Controller], searches: Mapping[str, Search]) ->
 def _tested(session: Session, study: Study, family: Family, candidates: Sequence[Candidate]) -> WorldRanking:
     import numpy as np
 
-    from wristctl.comparison.world_ranking import RANKED, RankedRow, ranking, world_scores
+    from wristctl.comparison.world_ranking import RANKED, measured_row, ranking
     from wristctl.control.table import controller
     from wristctl.simulation.cases import measure
     from wristctl.simulation.drawn_worlds import drawn_cases
@@ -210,15 +211,8 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
             gains = np.array([list(law.values(candidate.gains))])
             measured.append(measure(law, gains, cases, study.wrist, RANKED))
             advance(number)
-    rows = [
-        RankedRow(
-            candidate.label,
-            world_scores(of_candidate, tests)[0],
-            np.any(of_candidate.swings_beside(measured[-1]).reshape(tests, -1), axis=1),
-            of_candidate,
-        )
-        for candidate, of_candidate in zip(candidates, measured, strict=True)
-    ]
+    labels = [candidate.label for candidate in candidates]
+    rows = [measured_row(label, own, measured[-1], tests) for label, own in zip(labels, measured, strict=True)]
     return ranking(FAMILY, family, rows, tolerated=TOLERATED)
 
 
@@ -231,9 +225,7 @@ def _rehearsed(session: Session, study: Study, result: Recommended, planes: int)
         return result
     while result.untried:
         rows = result.untried[:at_once]
-        finalists = [
-            {"controller": one.controller, "gains": dict(one.gains)} for one in map(result.candidates.__getitem__, rows)
-        ]
+        finalists = [row_of(one.controller, one.gains) for one in map(result.candidates.__getitem__, rows)]
         runs = rehearsed(session, study, finalists, result.reach_deg, planes)
         result = replace(result, rehearsals={**result.rehearsals, **dict(zip(rows, runs, strict=True))})
         if result.best_row is not None:
@@ -319,10 +311,16 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
         keep_study(findings, file, found, content)
 
 
+def _in_one_plane(study: Study) -> bool:
+    from wristctl.commands.recommend.reach import asked_of_rigs
+
+    return study.recommend.rig is None and not why_two_planes(study.wrist, asked_of_rigs(study))
+
+
 RECOMMEND = Procedure(
     "recommend",
     plan,
     recommend,
     (FROM_IDENTIFIED,),
-    in_one_plane=lambda study: study.recommend.rig is None and not why_two_planes(study.wrist, asked_of_rigs(study)),
+    in_one_plane=_in_one_plane,
 )

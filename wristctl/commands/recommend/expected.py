@@ -1,4 +1,4 @@
-"""The error to expect of the trial of what is recommended, and which fact of the rig leaves it open."""
+"""What is tested, the error to expect of its trial, and which fact of the rig leaves that open."""
 
 from __future__ import annotations
 
@@ -6,16 +6,57 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from wristctl.commands.kept_studies import file_of
 from wristctl.commands.printed_table import capital, degrees, joined
-from wristctl.commands.recommend.candidate import Candidate, share_of, spread
-from wristctl.commands.recommend.reach import FAMILY
-from wristctl.commands.recommend.rehearsals import motions_of_trial
 from wristctl.config.families import Drawn, Family, Range
+from wristctl.config.loop import Reference
 from wristctl.config.recommend import DELAY, MEASURED, known_delay
+from wristctl.config.study import Study
 
 if TYPE_CHECKING:
-    from wristctl.config.loop import Reference
-    from wristctl.config.study import Study
+    from wristctl.arrays import Array
+
+
+# Name of the family of simulated rigs, of which the draws are named.
+FAMILY = "recommend"
+# Share of rigs that may fall short of an angle, and that a controller must not be shown to lose: those drawn have the
+# worst of friction, delay and load.
+TOLERATED = 0.05
+# Rigs from which 95 % of them are told: of fewer, the ends would be the least and the largest error.
+ENOUGH = 40
+
+
+class Candidate(NamedTuple):
+    """A controller with gains that are tested."""
+
+    controller: str
+    origin: str
+    """`tuned`, or `scaled preset`."""
+    gains: dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """Controller and origin."""
+        return f"{self.controller} ({self.origin})" if self.gains else self.controller
+
+    @property
+    def file(self) -> str:
+        """Its study file in the run: data/controllers/ct-dob-tuned.yaml."""
+        return file_of(self.label)
+
+
+def spread(errors: Array) -> tuple[float, float, float]:
+    """Error [rad] that 2.5, 50 and 97.5 of 100 rigs stay below."""
+    import numpy as np
+
+    low, median, high = np.percentile(errors, (2.5, 50.0, 97.5), method="nearest")
+    return float(low), float(median), float(high)
+
+
+def share_of(count: int) -> str:
+    """How many of the simulated rigs an interval is of; of few the number alone."""
+    return f"95 % of {count}" if count >= ENOUGH else f"{count}"
+
 
 # Ratio of a range's ends up to which nobody is told to measure anything.
 _WIDE = 3.0
@@ -114,6 +155,8 @@ class Expected(NamedTuple):
 
 def expected(study: Study, best: Candidate, family: Family, reach_deg: float, planes: int) -> Expected:
     """The error of the recommended gains over the simulated rigs in the trial that `hw-run` makes of them."""
+    from wristctl.commands.recommend.rehearsals import motions_of_trial
+
     motions, horizon = motions_of_trial(study, reach_deg, planes)
     asked = asked_for(family, motions, horizon)
     found = _over_rigs(study, best, asked)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wristctl.commands.recommend.candidate import spread
+from wristctl.commands.recommend.answer import Limit, Recommended
+from wristctl.commands.recommend.expected import spread
 from wristctl.plotting.kinds import Dot, draw_dots
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic
-
-if TYPE_CHECKING:
-    from wristctl.commands.recommend.answer import Limit, Recommended
 
 
 def errors(result: Recommended) -> Figure:

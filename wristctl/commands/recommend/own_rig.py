@@ -6,19 +6,21 @@ speak of, as friction and the springs, is drawn as for any rig.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from wristctl.config.choices import RIGS
+from wristctl.config.families import Drawn, Family
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.loop import Loop
 from wristctl.config.recommend import RecommendSettings
 from wristctl.config.study import Study
-from wristctl.rig import Drive, Facts, Quantity, Sensor, Spread, value
-
-if TYPE_CHECKING:
-    from wristctl.config.families import Drawn, Family
-    from wristctl.config.hw_run import HwRunSettings
-    from wristctl.config.loop import Loop
+from wristctl.rig import Drive, Facts, Quantity, Spread, value
+from wristctl.trial.experiment import spared
+from wristctl.trial.rig_belief import layout_of_rig
+from wristctl.trial.rig_settings import check_facts, settings_of, wrist_of
+from wristctl.trial.trial_results import in_pairs
 
 # Rigs whose facts are drawn; of these each simulated rig has one.
 _ROWS = 32
@@ -61,34 +63,24 @@ def _spoken(facts: Facts) -> dict[str, Spoken]:
 
 
 def _facts(study: Study) -> tuple[Facts, str]:
+    """Facts of the study's rig, and its name. Raises UserError where they cannot be."""
     name = study.recommend.rig
     assert name is not None
-    return _facts_of(name), name
-
-
-def _facts_of(name: str) -> Facts:
-    """Facts of the rig of this name. Raises UserError where they cannot be."""
-    from wristctl.trial.rig_settings import check_facts
-
-    return check_facts(getattr(RIGS[name], "facts", None), name)
+    return check_facts(getattr(RIGS[name], "facts", None), name), name
 
 
 def _trials(study: Study) -> HwRunSettings:
     """Settings of `hw-run` on this rig."""
-    from wristctl.trial.rig_settings import settings_of
-
     facts, name = _facts(study)
     return settings_of(facts, study.hw_run.model_copy(update={"rig": name}), name)
 
 
-def with_facts(study: Study, name: str) -> Study:
-    """The study with a rig's tendons, wrist, motors and sensor, where nobody gave others, and with what is drawn of it.
+def with_facts(study: Study) -> Study:
+    """The study with its rig's tendons, wrist, motors and sensor, where nobody gave others, and what is drawn of it.
 
     Raises UserError where the facts cannot be, or do not fit what was given.
     """
-    from wristctl.trial.rig_settings import wrist_of
-
-    facts = _facts_of(name)
+    facts, name = _facts(study)
     wrist = wrist_of(facts, study.wrist, name)
     settings, known = study.recommend, _trials(study).known_loop
     usual = RecommendSettings.model_fields["loop"].default
@@ -120,7 +112,7 @@ def drawn_by_facts(facts: Facts) -> dict[str, Drawn]:
 def narrowed(study: Study, told: Collection[str] | None) -> Study:
     """The study of an identified wrist, whose rigs differ by what the `told` settings leave open; None: all."""
     settings = study.recommend
-    own = {} if settings.rig is None else {"usual": drawn_by_facts(_facts_of(settings.rig))}
+    own = {} if settings.rig is None else {"usual": drawn_by_facts(_facts(study)[0])}
     return study.model_copy(update={"recommend": settings.measured(told, **own)})
 
 
@@ -132,10 +124,6 @@ def on_the_rig(study: Study) -> Study:
     """
     if study.recommend.rig is None:
         return study
-    from wristctl.trial.experiment import spared
-    from wristctl.trial.rig_belief import layout_of_rig
-    from wristctl.trial.trial_results import in_pairs
-
     trials, settings = _trials(study), study.recommend
     wrist, loop = spared(study.wrist, trials), settings.loop
     layout = layout_of_rig(trials, wrist)
@@ -156,43 +144,37 @@ def drawn_of_facts(study: Study, family: Family) -> Family:
 
 def _rows(study: Study, facts: Facts) -> list[dict[str, float]]:
     """Facts of so many rigs, evenly from all ranges, as leaves of a loop; none where nothing is to be drawn."""
-    drive, sensor, loop = facts.drive, facts.sensor, study.recommend.loop
-    spreads = [name for name, fact in _spoken(facts).items() if isinstance(fact.quantity, Spread)]
-    spreads = [name for name in spreads if name != "stiffness"]
+    quantities = {name: fact.quantity for name, fact in _spoken(facts).items() if name != "stiffness"}
+    spreads = {name: quantity for name, quantity in quantities.items() if isinstance(quantity, Spread)}
+    known = {name: float(quantity) for name, quantity in quantities.items() if not isinstance(quantity, Spread)}
     rows = []
     for shares in _even(len(spreads)) if spreads else [()]:
-        drawn = dict(zip(spreads, shares, strict=True))
-
-        def at(name: str, quantity: Quantity, drawn: dict[str, float] = drawn) -> float:
-            if isinstance(quantity, Spread):
-                return quantity.low + drawn[name] * (quantity.high - quantity.low)
-            return float(quantity)
-
-        rows.append(_row(at, spreads, drive, sensor, loop))
+        drawn = {
+            name: q.low + share * (q.high - q.low) for (name, q), share in zip(spreads.items(), shares, strict=True)
+        }
+        rows.append(_row(drawn, known, facts, study.recommend.loop))
     return rows
 
 
-def _row(
-    at: Callable[[str, Quantity], float], spreads: Sequence[str], drive: Drive, sensor: Sensor, loop: Loop
-) -> dict[str, float]:
-    """One rig's facts as leaves of the loop; rate and resolution are what the controller believes, too."""
-    row: dict[str, float] = {}
-    if backlash := at("backlash", drive.backlash):
-        row["plant.actuator.backlash"] = backlash
-    if "delay" in spreads:
-        row["plant.actuator.command_delay"] = min(0.1, at("delay", drive.delay))
-    if "lag" in spreads:
-        row["plant.actuator.lag"] = at("lag", drive.lag)
-    if "resolution" in spreads:
-        row["actuator.resolution"] = at("resolution", drive.resolution)
+# Leaves of a loop that a fact is as it stands; resolution is what the controller believes, too.
+_LEAVES = {
+    "lag": "plant.actuator.lag", "resolution": "actuator.resolution", "noise": "plant.sensor.noise_deg",
+}  # fmt: skip
+
+
+def _row(drawn: Mapping[str, float], known: Mapping[str, float], facts: Facts, loop: Loop) -> dict[str, float]:
+    """One rig's facts as leaves of the loop; the rate is what the controller believes, too."""
+    at, row = {**known, **drawn}, {leaf: drawn[name] for name, leaf in _LEAVES.items() if name in drawn}
+    if at["backlash"]:
+        row["plant.actuator.backlash"] = at["backlash"]
+    if "delay" in drawn:
+        row["plant.actuator.command_delay"] = min(0.1, at["delay"])
     rate = loop.sensor.frame_rate
-    if "rate" in spreads:
-        row["sensor.frame_rate"] = rate = min(at("rate", sensor.rate), 1.0 / loop.control_period)
-    if {"rate", "age"} & set(spreads):
-        row["sensor.delay_frames"] = min(20.0, value(sensor.delay) * rate)
-        row["plant.sensor.delay_frames"] = min(20.0, at("age", sensor.delay) * rate)
-    if "noise" in spreads:
-        row["plant.sensor.noise_deg"] = at("noise", sensor.noise_deg)
+    if "rate" in drawn:
+        row["sensor.frame_rate"] = rate = min(at["rate"], 1.0 / loop.control_period)
+    if drawn.keys() & {"rate", "age"}:
+        row["sensor.delay_frames"] = min(20.0, value(facts.sensor.delay) * rate)
+        row["plant.sensor.delay_frames"] = min(20.0, at["age"] * rate)
     return row
 
 

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from wristctl.commands.recommend.expected import FAMILY, TOLERATED
 from wristctl.commands.recommend.own_rig import drawn_of_facts
 from wristctl.config.families import Family
+from wristctl.config.loop import Loop
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.drawn_worlds import asked_of, world_of
+from wristctl.simulation.planes import Asked, planes_of
+from wristctl.simulation.worlds import plant_of
+from wristctl.wrist.spatial.held_bends import held_all_around
+from wristctl.wrist.statics import shortfall
+from wristctl.wrist.tendon_layout import TendonLayout
 
-if TYPE_CHECKING:
-    from wristctl.config.loop import Loop
-    from wristctl.config.wrist import WristParameters
-    from wristctl.simulation.planes import Asked
-
-# Name of the family of simulated rigs, of which the draws are named.
-FAMILY = "recommend"
 # Angle [deg] that the tendons must hold for a motion to be worth a search.
 LEAST_DEG = 5.0
-# Share of rigs that may fall short of an angle, and that a controller must not be shown to lose: those drawn have the
-# worst of friction, delay and load.
-TOLERATED = 0.05
 # Most rigs on which it is looked for.
 _RIGS = 100
 
 
 def asked_of_rigs(study: Study) -> list[Asked]:
     """The simulated rigs with what they are asked for, before it is known whether that is in two planes."""
-    from wristctl.simulation.drawn_worlds import asked_of
-
     return asked_of(_family(study, LEAST_DEG))
 
 
@@ -40,8 +36,6 @@ def _family(study: Study, largest_deg: float, planes: int = 1) -> Family:
 
 def family_of_rigs(study: Study, largest_deg: float) -> Family:
     """The simulated rigs, in two planes where anything takes them out of one. Raises UserError."""
-    from wristctl.simulation.planes import planes_of
-
     return _family(study, largest_deg, planes_of(study.wrist, asked_of_rigs(study)))
 
 
@@ -50,9 +44,6 @@ def reach_deg(study: Study) -> float:
 
     To both sides of one plane, in two planes to any side, against each rig's own load.
     """
-    from wristctl.simulation.drawn_worlds import world_of
-    from wristctl.simulation.planes import planes_of
-
     settings, planes = study.recommend, planes_of(study.wrist, asked_of_rigs(study))
     wanted = min(settings.largest_deg, study.wrist.range_deg)
     family, count = _family(study, wanted, planes), min(settings.tests, _RIGS)
@@ -63,10 +54,6 @@ def reach_deg(study: Study) -> float:
 
 def _held_deg(wrist: WristParameters, rig: Loop, wanted: float, planes: int) -> float:
     """Angle [deg], at most the wanted, that the tendons of one rig hold."""
-    from wristctl.wrist.spatial.held_bends import held_all_around
-    from wristctl.wrist.statics import shortfall
-    from wristctl.wrist.tendon_layout import TendonLayout
-
     if not rig.limits:
         return wanted
     actual, load, held = _as_pulled(wrist, rig, wanted), rig.disturbances.load, wanted
@@ -86,8 +73,6 @@ def _as_pulled(wrist: WristParameters, rig: Loop, wanted: float) -> WristParamet
     A tendon that is softer than believed pulls as much less, and what rubs in its sheath and along a bend of the wanted
     angle [deg] takes its share (Euler and Eytelwein): of the pulling side, and of the other, which it adds to.
     """
-    from wristctl.simulation.worlds import plant_of
-
     actual = plant_of(wrist, rig.plant)
     if not rig.actuator.winds:
         return actual

@@ -6,19 +6,21 @@ import logging
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from wristctl.commands.kept_studies import rig_of
 from wristctl.commands.recommend.study_file import sections_of, trial_of
+from wristctl.commands.session import Session
 from wristctl.config.families import drawn_value
+from wristctl.config.hw_run import HwRunSettings, RigDirection
+from wristctl.config.loop import Reference
+from wristctl.config.study import Study
 from wristctl.errors import UserError
-
-if TYPE_CHECKING:
-    from wristctl.commands.session import Session
-    from wristctl.config.hw_run import HwRunSettings, RigDirection
-    from wristctl.config.loop import Reference
-    from wristctl.config.study import Study
-    from wristctl.trial.rehearsed import Rehearsed
+from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.trial.motions import has_path
+from wristctl.trial.rehearsed import Rehearsed, rehearse
+from wristctl.trial.resting import judge_weight, sag_of
+from wristctl.trial.rig_belief import PLANES, TOWARD
 
 # Springs that weaken to this share of the believed still hold the hand up, with so much in hand: else nobody can home.
 _WEAKEST, _IN_HAND = 0.7, 1.2
@@ -57,8 +59,6 @@ class Rehearsal(NamedTuple):
     @property
     def fault(self) -> str:
         """Why it is not to be used; empty where it is sound."""
-        from wristctl.simulation.oscillation import LIMIT_CYCLE
-
         for motion, own in (("", self.runs), (" on circumduction", self.around)):
             for scale, run in own.items():
                 if run.outcome != "ok":
@@ -74,9 +74,6 @@ def check_homing(study: Study, planes: int) -> None:
     Only where the recommendation is for `hw-run`. Springs may have weakened to 0.7 of what is believed; those of a
     wrist that was identified as far as rigs are drawn.
     """
-    from wristctl.trial.resting import judge_weight, sag_of
-    from wristctl.trial.rig_belief import PLANES
-
     if trial_of(study) != "hw-run" or study.hw_run.rig is not None:
         return
     names = PLANES if planes == 2 else ("ulnar",)
@@ -98,8 +95,6 @@ def rehearsed(
 
     Raises SafetyStop where the emulated rig cannot be homed.
     """
-    from wristctl.trial.motions import has_path
-
     runs: list[dict[float, Rehearsed]] = [{} for _ in rows]
     around: list[dict[float, Rehearsed]] = [{} for _ in rows]
     scales = _scales(study)
@@ -116,8 +111,6 @@ def rehearsed(
 
 def _rehearse(study: Study, asked: HwRunSettings, scale: float, runs: Sequence[dict[float, Rehearsed]]) -> None:
     """Try all candidates with springs of this share, and note how each does."""
-    from wristctl.trial.rehearsed import rehearse
-
     with _quietly():
         done = rehearse(study.model_copy(update={"hw_run": asked}))
     for of_candidate, run in zip(runs, done, strict=True):
@@ -126,8 +119,6 @@ def _rehearse(study: Study, asked: HwRunSettings, scale: float, runs: Sequence[d
 
 def _circling(reference: Reference) -> Reference:
     """The hand circles with a bend as large as the reference's."""
-    from wristctl.config.loop import Reference
-
     return Reference.model_validate({"kind": "circumduction", "angle_deg": abs(reference.end_deg)})
 
 
@@ -145,10 +136,6 @@ def _quietly() -> Iterator[None]:
 
 def motions_of_trial(study: Study, reach_deg: float, planes: int) -> tuple[list[Reference], float]:
     """The motions of the rehearsed trials as simulated rigs are asked for them, and how long each is looked at [s]."""
-    from wristctl.config.loop import Reference
-    from wristctl.trial.motions import has_path
-    from wristctl.trial.rig_belief import TOWARD
-
     settings = _asked(study, [], reach_deg, planes, 1.0)
     asked = settings.reference
     if planes == 1:
@@ -181,8 +168,6 @@ def _asked(
 
     In the directions that the study has, else to both sides.
     """
-    from wristctl.config.hw_run import HwRunSettings
-
     own = study.hw_run
     given = own.model_dump(by_alias=True, include=own.model_fields_set)
     tried = {"controllers": tuple(rows)} if rows else {}

@@ -82,14 +82,11 @@ def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     """
     command = trial_of(study)
     words, taken = list(typed), {"seed", *sections_read(command)}
-    places = [k for k, word in enumerate(words) if words[k - 1] == "--set" and _section(word) not in taken]
+    sections = [word.partition("=")[0].partition(".")[0].replace("-", "_") for word in words]
+    places = [k for k, section in enumerate(sections) if words[k - 1] == "--set" and section not in taken]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
     own = own_rig(study)
     return shlex.join(["wristctl", command, *(["--rig", own] if own is not None else []), *kept, file])
-
-
-def _section(override: str) -> str:
-    return override.partition("=")[0].partition(".")[0].replace("-", "_")
 
 
 def _within(reference: Reference, reach_deg: float) -> dict[str, Any]:

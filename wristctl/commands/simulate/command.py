@@ -6,10 +6,9 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverses,
@@ -24,16 +23,7 @@ from wristctl.commands.inputs_of_loops import (
 )
 from wristctl.commands.kept_studies import asked_for, keep_study
 from wristctl.commands.live_record import check_live, listened
-from wristctl.commands.loop_warnings import (
-    OutOfReach,
-    asked_by,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_if_outside,
-    warn_of_one_plane,
-    warn_out_of_reach,
-    warn_outside_conditions,
-)
+from wristctl.commands.loop_warnings import OutOfReach, warn_if_outside, warn_of_loops, warn_outside_conditions
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.results import Simulated, metrics_table, trajectory_table
@@ -42,16 +32,17 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.loop import sample_period
 from wristctl.config.study import Study
 from wristctl.errors import under
+from wristctl.wrist.directions import DIRECTIONS
 
 if TYPE_CHECKING:
-    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.repetitions import Repeated
     from wristctl.wrist.kinematics import Inverse
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """Check the controller and its gains."""
+    """Check the controller and its gains, and tell the rollouts and what of their world is not as believed."""
+    from wristctl.commands.truth_table import truth_told
     from wristctl.simulation.closed_loop import check_size
 
     settings, known = study.simulate, identified(study, "simulate", inputs)
@@ -63,15 +54,8 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_motion(known, planes)
         check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study), planes=planes)
-    return _in_words(study, " in two planes" * (planes == 2), known.wrist)
-
-
-def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
-    """The rollouts of a plan, and what of their world is not as believed."""
-    from wristctl.commands.truth_table import truth_told
-
-    times, settings = size(study).rollouts, study.simulate
-    truth = truth_told(wrist, {"simulate": settings.loop})
+    times, where = size(study).rollouts, " in two planes" * (planes == 2)
+    truth = truth_told(known.wrist, {"simulate": settings.loop})
     return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{where}{truth}"
 
 
@@ -91,17 +75,13 @@ def simulate(session: Session) -> Simulated:
     from wristctl.commands.truth_table import truth_tables
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
-    from wristctl.simulation.metrics import metrics_in
     from wristctl.simulation.worlds import Draws
 
     asked, session = session.study, replace(session, study=listened(session))
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist, planes = study.simulate, study.wrist, planes_of_simulation(study)
-    warn_if_it_buckles(findings, wrist, [settings.loop], planes)
-    warn_if_coarse([settings.loop])
-    warn_of_one_plane(wrist, asked_of_simulation(study))
     warn_outside_conditions([settings], [settings.loop])
-    beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
+    beyond = warn_of_loops(findings, study, settings, asked_of_simulation(study), planes)
     network = network_for(session.inputs, wrist, [settings.loop], planes)
     with session.progress("simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
@@ -111,15 +91,16 @@ def simulate(session: Session) -> Simulated:
     warn_if_outside(course.outside)
     if planes == 2:
         findings.numerics(planes=2, substeps=int(repeated.metrics["substeps"].max()), drift=repeated.drift)
-    trajectory_table(findings, "trajectory" if planes == 1 else "bends", course)
+    trajectory_table(findings, course)
     findings.headline(*_HEADLINES[planes])
     gains = settings.gains if isinstance(settings.gains, str) else "given"
     label = course.label if planes == 1 else f"{settings.controller}/{gains} in two planes"
     title = ", ".join(part for part in (label, repeated.fate) if part)
-    metrics = metrics_in(planes)
-    tables = [metrics_table(findings, title, metrics, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    tables = [metrics_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.drawing():
-        (_draw if planes == 1 else _draw_bends)(session, study, repeated)
+        from wristctl.commands.simulate.figures import draw, draw_bends
+
+        (draw if planes == 1 else draw_bends)(session, study, repeated)
     arrives = repeated.failed.any() or repeated.arrives
     short_of, advice = ("", []) if arrives else _short_of(session, study, repeated, network, beyond)
     words = wrist_identified(session.inputs)
@@ -131,54 +112,6 @@ _HEADLINES = {
     1: ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension"),
     2: ("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse_mm", "peak_tension"),
 }
-
-
-def _draw(session: Session, study: Study, repeated: Repeated) -> None:
-    """Draw a motion in one plane over time, and for later its observer, its sliding surface and the wrist."""
-    from wristctl.commands.simulate.figures import consistency, sliding
-    from wristctl.commands.truth_table import truth_heading
-    from wristctl.control.table import controller, gains_of
-    from wristctl.plotting.loop_figures import one_motion, over_time, spread_of_sizes, tensions
-    from wristctl.plotting.wrist_drawing import stroboscope
-
-    settings, findings, course = study.simulate, session.findings, repeated.first.trajectory
-    world, later = truth_heading(study.wrist, settings.loop), partial(findings.figure, later=True)
-    caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
-    findings.figure("course", one_motion, course, heading=world, caption=caption)
-    if len(repeated.failed) > 1:
-        caption = "Size of the error over time: the repetitions' median with its 95 % interval"
-        findings.figure("error-repetitions", over_time, [course], spread_of_sizes([repeated]), caption=caption)
-    for part, caption in (("angle", "Desired and obtained bending angle over time"), ("error", "Its error over time")):
-        later(part, over_time, [course], part, heading=world, caption=caption)
-    findings.figure("tensions", tensions, course, later=not repeated.marks)
-    if course.load is not None:
-        later("observer", consistency, course, heading=world)
-    law = controller(settings.controller)
-    if law.surface is not None and not repeated.failed.any():
-        gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
-        caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
-        later("sliding", sliding, course, law.surface, gains, caption=caption)
-    later("motion", stroboscope, course, study.wrist, plant=settings.loop.plant.model)
-
-
-def _draw_bends(session: Session, study: Study, repeated: Repeated) -> None:
-    """Draw a motion in two planes: the plane of bends with what the tendons reach, and the wrist in space."""
-    from wristctl.commands.truth_table import truth_heading
-    from wristctl.plotting.bend_figure import bend_motion
-    from wristctl.plotting.spatial_view import motion_in_space
-    from wristctl.simulation.worlds import plant_of
-    from wristctl.wrist.spatial.held_bends import reach_of_bends
-    from wristctl.wrist.tendon_layout import TendonLayout
-
-    wrist, loop, findings, course = study.wrist, study.simulate.loop, session.findings, repeated.first.trajectory
-    world, reach = truth_heading(wrist, loop), reach_of_bends(wrist, TendonLayout.of(wrist))
-    findings.overview.figure = "bends"
-    caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
-    findings.figure("bends", bend_motion, course, reach, world, caption=caption)
-    caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
-    findings.figure(
-        "space", motion_in_space, course, plant_of(wrist, loop.plant), world, loop.plant.model, caption=caption
-    )
 
 
 def _short_of(
@@ -227,7 +160,6 @@ def _search(session: Session, study: Study) -> str:
     Empty without a run, and in the other plane than `tune` has.
     """
     from wristctl.simulation.reference import toward
-    from wristctl.wrist.directions import DIRECTIONS
 
     chosen, findings, name = study.simulate, session.findings, "here"
     own_plane = REFERENCES[chosen.reference.kind].planes == 2 or DIRECTIONS[chosen.direction].plane == "ulnar"
@@ -251,11 +183,7 @@ SIMULATE = sweepable(
         "simulate",
         plan,
         simulate,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("tuned", kind="tune", optional=True),
-            FROM_IDENTIFIED,
-        ),
+        (NETWORK, TUNED, FROM_IDENTIFIED),
         size=size,
         in_one_plane=lambda study: planes_of_simulation(study) == 1,
     )

@@ -1,14 +1,22 @@
-"""Figures of one closed loop: how it comes to its sliding surface, and its observer."""
+"""Figures of one closed loop: over time, its sliding surface, its observer, and the wrist."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
+from wristctl.commands.inputs_of_loops import tuned_gains
+from wristctl.commands.session import Session
+from wristctl.commands.truth_table import truth_heading
+from wristctl.config.study import Study
 from wristctl.control.law import Surface
-from wristctl.plotting.loop_figures import in_parts
+from wristctl.control.table import controller, gains_of
+from wristctl.plotting.bend_figure import bend_motion
+from wristctl.plotting.loop_figures import in_parts, one_motion, over_time, spread_of_sizes, tensions
+from wristctl.plotting.spatial_view import motion_in_space
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -21,7 +29,12 @@ from wristctl.plotting.style import (
     logarithmic,
     title,
 )
+from wristctl.plotting.wrist_drawing import stroboscope
+from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.simulation.worlds import plant_of
+from wristctl.wrist.spatial.held_bends import reach_of_bends
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Least rate [deg/s] to either side, and least |sigma| over its layer, that are drawn.
 _FIRST_RATE, _LEAST_SHARE = 1e-9, 1e-6
@@ -93,3 +106,38 @@ def consistency(course: Trajectory, heading: str = "") -> Figure:
     lower.set(xlabel="time [s]", ylabel="estimated load [N m]")
     title(lower, heading)
     return fig
+
+
+def draw(session: Session, study: Study, repeated: Repeated) -> None:
+    """Draw a motion in one plane over time, and for later its observer, its sliding surface and the wrist."""
+    settings, findings, course = study.simulate, session.findings, repeated.first.trajectory
+    world, later = truth_heading(study.wrist, settings.loop), partial(findings.figure, later=True)
+    caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
+    findings.figure("course", one_motion, course, heading=world, caption=caption)
+    if len(repeated.failed) > 1:
+        caption = "Size of the error over time: the repetitions' median with its 95 % interval"
+        findings.figure("error-repetitions", over_time, [course], spread_of_sizes([repeated]), caption=caption)
+    for part, caption in (("angle", "Desired and obtained bending angle over time"), ("error", "Its error over time")):
+        later(part, over_time, [course], part, heading=world, caption=caption)
+    findings.figure("tensions", tensions, course, later=not repeated.marks)
+    if course.load is not None:
+        later("observer", consistency, course, heading=world)
+    law = controller(settings.controller)
+    if law.surface is not None and not repeated.failed.any():
+        gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
+        caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
+        later("sliding", sliding, course, law.surface, gains, caption=caption)
+    later("motion", stroboscope, course, study.wrist, plant=settings.loop.plant.model)
+
+
+def draw_bends(session: Session, study: Study, repeated: Repeated) -> None:
+    """Draw a motion in two planes: the plane of bends with what the tendons reach, and the wrist in space."""
+    wrist, loop, findings, course = study.wrist, study.simulate.loop, session.findings, repeated.first.trajectory
+    world, reach = truth_heading(wrist, loop), reach_of_bends(wrist, TendonLayout.of(wrist))
+    findings.overview.figure = "bends"
+    caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
+    findings.figure("bends", bend_motion, course, reach, world, caption=caption)
+    caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
+    findings.figure(
+        "space", motion_in_space, course, plant_of(wrist, loop.plant), world, loop.plant.model, caption=caption
+    )

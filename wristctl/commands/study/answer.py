@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
-
-if TYPE_CHECKING:
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
+from wristctl.comparison.bootstrap import plain
+from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS, HALVES
+from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
 
 
 def answer_of(
@@ -25,18 +23,8 @@ def answer_of(
 ) -> Answer | None:
     """The answer of a study for one screen; None where nothing was ranked.
 
-    Parameters
-    ----------
-    rankings
-        Rankings of the controllers by family.
-    terms
-        RMSE without each term over RMSE with it, by family.
-    shifts
-        Changes of the order where controllers were tuned otherwise.
-    run
-        Path of the run; empty for a result in memory.
-    bending
-        Families whose loops bend in two planes, and why, in sentences; empty where all stay in one.
+    `shifts` are of the order where controllers were tuned otherwise; `run` is the path, empty for a result in memory;
+    `bending` says which families bend in two planes, and why.
     """
     if not rankings:
         return None
@@ -56,8 +44,6 @@ def answer_of(
 
 def few_tunings(rankings: Sequence[TunedRanking]) -> str:
     """That two tunings tell no interval, where there are no more."""
-    from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS
-
     if not any(1 < len(tunings) < FEWEST_TUNINGS for ranking in rankings for tunings in ranking.tunings):
         return ""
     return f"Two tunings tell no interval of an RMSE, nor of a ratio: {FEWEST_TUNINGS} or more do (`study.budgets`)."
@@ -65,14 +51,12 @@ def few_tunings(rankings: Sequence[TunedRanking]) -> str:
 
 def first_again(rankings: Sequence[TunedRanking]) -> str:
     """How often the best is first again: in halves of the worlds, and in single tunings of all."""
-    from wristctl.comparison.repeated_tunings import HALVES
-
     facts = []
     for ranking in rankings:
         row = winner(ranking, rankings)
-        if row is None or len([one for group in ranking.standing.groups for one in group]) < 2:
+        if row is None or not ranking.may_change:
             continue
-        firsts = ranking.firsts(row)
+        firsts = ranking.firsts[row]
         name = ranking.labels[row].split("/")[0]
         facts.append(f"{condition(ranking)} {name} {firsts.halves} and {firsts.tunings} of {firsts.of_tunings}")
     if not facts:
@@ -82,8 +66,6 @@ def first_again(rankings: Sequence[TunedRanking]) -> str:
 
 def terms_table(terms: Sequence[TermValue]) -> Table:
     """A term a line: how many times less the RMSE is with it in each family; undecided where the interval holds 1."""
-    from wristctl.comparison.bootstrap import plain
-
     families, names = (list(dict.fromkeys(getattr(one, key) for one in terms)) for key in ("family", "term"))
     values = {(one.term, one.family): one.times for one in terms}
 

@@ -6,14 +6,22 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import asked_of_family
+from wristctl.commands.inputs_of_loops import (
+    asked_of_family,
+    check_family_reach,
+    check_inverses,
+    check_row,
+    check_searched,
+    family_of,
+    inverses_of,
+)
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts
-from wristctl.commands.study.results import written
 from wristctl.commands.study.units import (
     Studied,
+    StudyPlace,
     budget_of,
     families_of,
     golden_of,
@@ -25,20 +33,16 @@ from wristctl.commands.study.units import (
 from wristctl.commands.units import performed
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
+from wristctl.work.worker import Unit
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from wristctl.commands.study.units import StudyPlace
-    from wristctl.work.worker import Unit
-
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check all names, and state the number of rollouts."""
-    from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
-    from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size, check_steps
-    from wristctl.tuning.search import check_optimiser, check_tunable
+    from wristctl.tuning.search import check_optimiser
 
     settings = study.study
     with under("study"):
@@ -47,9 +51,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             raise UserError("no families of worlds", "families", "include some of experiments/scenarios")
         for name in (*families_of(study), *filter(None, [settings.varied])):
             family_of(study.families, name, "families")
-        for number, name in enumerate(settings.laws):
-            with under(f"controllers.{number}"):
-                check_tunable(controller(name))
+        check_searched(settings.laws)
         for number, row in enumerate(settings.presets):
             with under(f"presets.{number}"):
                 check_row(row, None)
@@ -112,6 +114,7 @@ def _labels(study: Study) -> list[str]:
 
 def fair_study(session: Session) -> Studied:
     """Tune and judge all laws at equal budget on families of worlds: which is for which rig, what each term buys."""
+    from wristctl.commands.study.results import written
     from wristctl.tuning.search import search_of
 
     study = session.study

@@ -12,7 +12,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import plain
-from wristctl.comparison.paired_worlds import TermValue
+from wristctl.comparison.controller_ranking import labels_of
+from wristctl.comparison.tuned_ranking import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.plotting.kinds import Dot, draw_cells, draw_dots, draw_front, name_rows
 from wristctl.plotting.style import (
@@ -41,7 +42,7 @@ _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on
 
 def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     """Feedforward's RMSE over each controller's on each family: bold where nothing is better, slanted if not usable."""
-    labels = list(dict.fromkeys(label for family_ranking in rankings.values() for label in family_ranking.labels))
+    labels = labels_of(rankings.values())
     times, kinds = np.full((len(labels), len(rankings)), np.nan), np.full((len(labels), len(rankings)), "", object)
     for column, ranking in enumerate(rankings.values()):
         for index, label in enumerate(ranking.labels):
@@ -116,7 +117,7 @@ def _front(axes: Axes, cost: Array, rmse: Array, ranking: WorldRanking) -> None:
     sound = np.array([ranking.standing.group(row) is not None for row in range(len(rmse))])
     draw_front(axes, cost, rmse, sound, {"color": GREY, "linewidth": 1.0, "zorder": 1})
     for index in ranking.standing.order:
-        shade = colour(ranking.rows[index].label.split("/")[0])
+        shade = colour(ranking.labels[index])
         axes.plot(cost[index], rmse[index], "o", color=shade, markersize=6.0, linestyle="none",
                   markerfacecolor=shade if sound[index] else "none", label=ranking.rows[index].label)  # fmt: skip
     logarithmic(axes.xaxis)

@@ -4,46 +4,42 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_drawing import draw_intervals, draw_rankings, keep_error
-from wristctl.commands.ranking_tables import answer_tables, every_row
+from wristctl.commands.ranking_tables import answer_tables, draw_intervals, draw_rankings, every_row, keep_error
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import timed_steps
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of, places_in
+from wristctl.comparison.tuned_ranking import (
+    OrderShift,
+    TermValue,
+    TunedRanking,
+    order_shift,
+    published_tuning,
+    term_values,
+    tuned_ranking,
+)
+from wristctl.comparison.world_ranking import kinds_of, ranked_units, ranking_frame, row_of
 from wristctl.config.study import Study
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
-    from wristctl.control.law import Controller
-    from wristctl.tuning.search import Search
-    from wristctl.work.fan_out import Poisoned
+from wristctl.control.law import Controller
+from wristctl.control.table import controller, write_gains
+from wristctl.simulation.drawn_worlds import streams_of
+from wristctl.tuning.objective import YARDSTICK
+from wristctl.tuning.search import Search, search_stream
+from wristctl.work.fan_out import Poisoned
 
 Piece = Mapping[str, "np.ndarray"]
 Pieces = Mapping[StudyPlace, Sequence[Piece]]
 
 
 def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search], poisoned: list[Poisoned]) -> Studied:
-    """Rank the judged rows, and write rankings, tables and figures.
+    """Rank the judged rows by their metrics in ranges of worlds, and write rankings, tables and figures.
 
-    Parameters
-    ----------
-    session
-        Session of the study.
-    judged
-        Metrics of each judged row, in ranges of worlds.
-    searches
-        Search behind each row with tuned gains.
-    poisoned
-        Units that failed on every worker.
+    `poisoned` are units that failed on every worker.
     """
-    from wristctl.comparison.paired_worlds import term_values
-
     study = session.study
     with session.progress("ranking"):
         rankings = _rankings(study, judged)
@@ -79,10 +75,6 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
 
     The gains that are published are the same in both.
     """
-    from wristctl.comparison.tuned_ranking import published_tuning, tuned_ranking
-    from wristctl.comparison.world_ranking import kinds_of, row_of
-    from wristctl.tuning.objective import YARDSTICK
-
     rankings = dict[str, "TunedRanking"]()
     for family in families_of(study):
         of_family = _tunings(study, judged, BASE, family)
@@ -103,9 +95,6 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
 
 def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
     """Shift of the order by each variant, on the smooth motions of its family where it has any."""
-    from wristctl.comparison.paired_worlds import order_shift
-    from wristctl.comparison.world_ranking import kinds_of, row_of
-
     shifts, width = [], study.wrist.tension_range
     varied = study.study.varied or families_of(study)[0]
     places = places_in(study, varied)
@@ -124,9 +113,6 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
 
 
 def _note_streams(session: Session) -> None:
-    from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.tuning.search import search_stream
-
     study, findings = session.study, session.findings
     for name in families_of(study):
         for split in ("tune", "validation", "test"):
@@ -144,9 +130,6 @@ def _tables(
 ) -> None:
     """Tables and numbers for programs."""
     import pandas as pd
-
-    from wristctl.comparison.world_ranking import ranked_units, ranking_frame
-    from wristctl.control.table import write_gains
 
     findings = session.findings
     for name, ranking in rankings.items():
@@ -182,9 +165,6 @@ def _tables(
 
 def _laws(searches: Mapping[StudyPlace, Search]) -> dict[str, tuple[Controller, tuple[float, ...]]]:
     """Every controller with gains of one of its searches: for the time of a step they make no difference."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.objective import YARDSTICK
-
     laws: dict[str, tuple[Controller, tuple[float, ...]]] = {YARDSTICK: (controller(YARDSTICK), ())}
     for place, search in searches.items():
         law = controller(place.law)

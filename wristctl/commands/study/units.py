@@ -13,16 +13,15 @@ from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVari
 from wristctl.config.families import TuningWorlds
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
-from wristctl.errors import UserError
+from wristctl.errors import UserError, meant
+from wristctl.work.fan_out import Poisoned
+from wristctl.work.worker import Golden, Unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
     from wristctl.tuning.search import Search
-    from wristctl.work.fan_out import Poisoned
-    from wristctl.work.worker import Golden, Unit
 
 
 # Name of the study's own way to tune, among its variants.
@@ -41,8 +40,6 @@ class StudyPlace(NamedTuple):
 
 def budget_of(settings: FairStudySettings) -> StudyBudget:
     """The budget that is named. UserError with the nearest name where there is none."""
-    from wristctl.errors import meant
-
     if settings.budget not in settings.budgets:
         raise UserError(f"unknown budget '{settings.budget}'", "budget", meant(settings.budget, settings.budgets))
     return settings.budgets[settings.budget]
@@ -99,7 +96,6 @@ def golden_of(study: Study) -> Golden:
     """The numbers that all workers must come to; all that the study runs is compiled by then."""
     from wristctl.simulation.golden import GOLDEN, golden_spec, kinds_of_worlds
     from wristctl.tuning.objective import YARDSTICK
-    from wristctl.work.worker import Golden
 
     settings = study.study
     laws = dict.fromkeys([YARDSTICK, *settings.laws, *(row.controller for row in settings.presets)])

@@ -32,16 +32,9 @@ _ROLLOUT = (
 
 
 def quantities(table: pd.DataFrame, settings: Mapping[str, str], units: Mapping[str, str]) -> dict[str, Quantity]:
-    """Quantities of a sweep's columns, by name.
+    """Quantities of a sweep's columns, by name; of metrics that are not those of a loop in these `units`.
 
-    Parameters
-    ----------
-    table
-        A row for each point and repetition.
-    settings
-        Settings that were swept, each with its unit.
-    units
-        Units of metrics that are not those of a loop.
+    `table` has a row for each point and repetition, `settings` the unit of each that was swept.
     """
     about = {quantity.name: quantity for quantity in (*(_setting(*one) for one in settings.items()), *_ROLLOUT)}
     return {name: about.get(name) or of_metric(name, units.get(name, "")) for name in map(str, table)}
@@ -72,20 +65,9 @@ def headline(table: pd.DataFrame, metrics: Sequence[Quantity]) -> list[Quantity]
 def answer(
     command: str, table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Quantity], run: str = ""
 ) -> Answer:
-    """The answer of a sweep for one screen.
+    """The answer of a sweep for one screen: of its `table` in SI units, what was swept, and the metrics to show.
 
-    Parameters
-    ----------
-    command
-        Name of the command that was swept.
-    table
-        A row for each point and repetition; SI units.
-    keys
-        Settings that were swept.
-    metrics
-        Metrics that are shown, the main one first.
-    run
-        Path of the run; empty for a result in memory.
+    The first metric is the main one; `run` is the path, empty for a result in memory.
     """
     chosen = _some(table, [key.name for key in keys])
     where = f"{run}/data/sweep.csv" if run else "`.frame()`"

@@ -22,21 +22,23 @@ from wristctl.commands.inputs_of_loops import (
     identified,
     tuned_gains,
 )
-from wristctl.commands.procedure import Procedure, check_tendons
+from wristctl.commands.procedure import Procedure, check_tendons, procedure_named
+from wristctl.commands.progress import watched
 from wristctl.commands.quantities import Quantity, documented
 from wristctl.commands.results import Findings, StudyResult
-from wristctl.commands.session import Session
+from wristctl.commands.session import Session, Unattended
 from wristctl.commands.sweep.answer import answer, fates, headline, metrics_of, quantities, rows_of
+from wristctl.commands.units import performed
+from wristctl.config.loop import LOOPS
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
 from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
+from wristctl.work.fan_out import Poisoned
+from wristctl.work.worker import Golden, Unit
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
-
-    from wristctl.work.fan_out import Poisoned
-    from wristctl.work.worker import Golden, Unit
 
 
 # Points of `simulate` in one unit.
@@ -56,8 +58,6 @@ def sweep_units(
 
     `tuned` has gains of a tune run by controller and name, for controllers that are taken in turn.
     """
-    from wristctl.work.worker import Unit
-
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
     together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
@@ -136,23 +136,14 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     import numpy as np
 
     from wristctl.commands.perform import Prepared, perform
-    from wristctl.commands.progress import watched
-    from wristctl.commands.session import Unattended
-    from wristctl.work.worker import function_at
 
     (study,) = _studies(spec)
-    procedure: Any = function_at(_PROCEDURES[spec["command"]])
-    result: Any = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
+    procedure = procedure_named(spec["command"])
+    result = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
     metrics = result.findings.metrics
     values = {f"metric {name}": np.array([value]) for name, value in result.metrics.items()}
     units = {f"unit {name}": np.array([metric["unit"]]) for name, metric in metrics.items()}
     return {"point": np.zeros(1, np.int64), "repetition": np.zeros(1, np.int64), **values, **units}
-
-
-_PROCEDURES: Mapping[str, str] = {
-    "tune": "wristctl.commands.tune.command:TUNE",
-    "compare": "wristctl.commands.compare.command:COMPARE",
-}
 
 
 Found = TypeVar("Found", bound=StudyResult)
@@ -291,7 +282,6 @@ def _swept(session: Session, command: str) -> Swept:
     import pandas as pd
 
     from wristctl.commands.sweep.figures import over_setting
-    from wristctl.commands.units import performed
 
     study, findings = session.study, session.findings
     base, axes = _base(study, command, session.inputs), axes_of(study, command)
@@ -340,10 +330,8 @@ def _swept(session: Session, command: str) -> Swept:
 
 def _golden(study: Study, command: str) -> Golden:
     """Golden rollout of the loop of simulate or the built-in loop, by which workers show that they compute the same."""
-    from wristctl.config.loop import LOOPS
     from wristctl.simulation.golden import GOLDEN, golden_spec
     from wristctl.simulation.planes import planes_of
-    from wristctl.work.worker import Golden
 
     law, loop, asked = "feedforward", LOOPS["sampled"], asked_of_search
     if command == "simulate":

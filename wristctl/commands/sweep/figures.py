@@ -86,7 +86,7 @@ def over_setting(
         if labels is not None:
             panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
             panel.margins(x=0.1)
-        elif _is_logarithmic(places):
+        elif _is_wide(places) and np.median(places) < _EVEN * places.max():  # over decades, and not drawn evenly
             logarithmic(panel.xaxis)
         else:
             panel.xaxis.set_major_locator(MaxNLocator(_TICKS))
@@ -128,11 +128,6 @@ def _heading(table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Qu
 def _is_wide(values: np.ndarray) -> bool:
     finite = values[np.isfinite(values)]
     return bool(finite.size and finite.min() > 0.0 and finite.max() / finite.min() > _DECADES)
-
-
-def _is_logarithmic(values: np.ndarray) -> bool:
-    """Whether values reach over decades and were not drawn evenly."""
-    return _is_wide(values) and bool(np.median(values) < _EVEN * values.max())
 
 
 def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray, hue: str) -> None:

@@ -18,6 +18,7 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.records.files import files_below, sha256_of, sha256_of_list
 
 if TYPE_CHECKING:
     import numpy as np
@@ -249,21 +250,17 @@ def _frame(sightings: Sequence[Sighting], bends: Array | None = None) -> pd.Data
     import numpy as np
     import pandas as pd
 
-    fields = {
-        name: [getattr(sighting, name) for sighting in sightings]
-        for name in ("time", "number", "theta", "tip_x", "tip_y")
-    }
-    verdicts: dict[str, Any] = {"verdict": [str(sighting.verdict) for sighting in sightings]}
+    names = ("time", "number", "theta", "tip_x", "tip_y")
+    fields: dict[str, Any] = {name: [getattr(sighting, name) for sighting in sightings] for name in names}
+    fields["verdict"] = [str(sighting.verdict) for sighting in sightings]
     if bends is not None:
-        verdicts |= {"plane": [_PLANES[sighting.plane] for sighting in sightings], "bend": bends}
+        fields |= {"plane": [_PLANES[sighting.plane] for sighting in sightings], "bend": bends}
     corners = np.array([sighting.corners.ravel() for sighting in sightings]).T
-    return pd.DataFrame(fields | verdicts | dict(zip(_CORNERS, corners, strict=True)))
+    return pd.DataFrame(fields | dict(zip(_CORNERS, corners, strict=True)))
 
 
 def _digest(source: Path) -> str:
     """SHA-256 of a file, or of the list of a folder's files."""
-    from wristctl.records.files import files_below, sha256_of, sha256_of_list
-
     if source.is_file():
         return sha256_of(source)
     return sha256_of_list([(name, sha256_of(source / name)) for name in files_below(source)])

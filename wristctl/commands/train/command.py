@@ -17,19 +17,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
-from wristctl.commands.train.answer import answer_of
 from wristctl.commands.train.learned_dynamics import TrainedDynamics, check_dynamics, keep_dynamics
-from wristctl.commands.train.results import (
-    best_row,
-    error_table,
-    grid_tables,
-    keep_curves,
-    keep_network,
-    ranking_tables,
-    timing_table,
-    trial_table,
-    trials_frame,
-)
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
@@ -166,6 +154,8 @@ class Trained(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error on samples that no training has seen, beside the closed form's."""
+        from wristctl.commands.train.results import answer_of
+
         kept, segments = (self.kept, len(self.trials)), self.network.segments
         return answer_of(self.errors, len(self.split.test), kept, self.place, self.data, segments)
 
@@ -197,6 +187,10 @@ def plan(study: Study, inputs: Inputs) -> str:
         source = run.id if run else "those given" if "data" in inputs else source
         whose = recordings(samples, settings)
     split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
+    shares = []
+    if split.recording is not None:
+        counts = [len(np.unique(split.recording[rows])) for rows in (split.train, split.validation, split.test)]
+        shares = [f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"]
     lines = [
         f"{settings.seeds} x {row.epochs} epochs of a {'-'.join(map(str, row.hidden))} {row.activation} network"
         + (f" ({name})" if name else "")
@@ -210,7 +204,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             *lines,
             f"on {source}: {len(split.train)} samples to train on, {len(split.validation)} to choose by, "
             f"{len(split.test)} to judge by",
-            *([] if split.recording is None else [_shares(split, split.recording)]),
+            *shares,
         ]
     )
 
@@ -218,13 +212,6 @@ def plan(study: Study, inputs: Inputs) -> str:
 def recordings(samples: Samples | Transitions, settings: TrainSettings) -> NDArray[np.int64] | None:
     """The recording of each sample where these are what is split, else None."""
     return samples.recording if settings.split == "recording" else None
-
-
-def _shares(split: Split, whose: NDArray[np.int64]) -> str:
-    import numpy as np
-
-    counts = [len(np.unique(whose[rows])) for rows in (split.train, split.validation, split.test)]
-    return f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"
 
 
 def networks(settings: TrainSettings) -> dict[str, NetworkSettings]:
@@ -243,6 +230,7 @@ def train(session: Session) -> Trained | TrainedDynamics:
     """Train networks from tip position to bend, or one of the dynamics where the samples are transitions."""
     import numpy as np
 
+    from wristctl.commands.train import results
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.evaluation import places
     from wristctl.learning.training_result import best_of
@@ -250,41 +238,43 @@ def train(session: Session) -> Trained | TrainedDynamics:
 
     settings, findings = session.study.train, session.findings
     samples = session.inputs.read("data", samples_of)
-    if samples is None and session.study.gen_data.source == "transitions":
-        entropy = findings.stream("samples")
-        samples = draw_transitions(session.study.gen_data, session.study.wrist, np.random.default_rng(entropy))
+    if samples is None:
+        study, entropy = session.study, findings.stream("samples")
+        if study.gen_data.source == "transitions":
+            samples = draw_transitions(study.gen_data, study.wrist, np.random.default_rng(entropy))
+        else:
+            samples = drawn(study, entropy, recorded(study, Inputs()))
         findings.arrays("data/samples.npz", samples.arrays())
     if isinstance(samples, Transitions):
-        return _of_dynamics(session, samples)
-    if samples is None:
-        samples = drawn(session.study, findings.stream("samples"), recorded(session.study, Inputs()))
-        findings.arrays("data/samples.npz", samples.arrays())
+        check_dynamics(settings)
     rng = np.random.default_rng(findings.stream("split"))
     whose = recordings(samples, settings)
-    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out, whose)
+    split = split_samples(len(samples.targets), settings.train_share, rng, samples.held_out, whose)
     checkpoints = checkpoints_of(session)
+    if isinstance(samples, Transitions):
+        return _of_dynamics(session, samples, split, checkpoints)
 
     began, choice, tables = time.perf_counter(), None, []
     wanted = networks(settings)
     if settings.search:
         choice = chosen_by_folds(session, samples, split, checkpoints)
         wanted = {"": choice.chosen.settings}
-        tables += grid_tables(findings, choice)
+        tables += results.grid_tables(findings, choice)
     trials = train_networks(session, samples, split, wanted, checkpoints)
     seconds = time.perf_counter() - began
 
-    name, row_trials = best_row(trials)
+    name, row_trials = results.best_row(trials)
     kept = best_of(row_trials)
-    keep_network(session, kept.network, name, choice.reason if choice else "")
+    results.keep_network(session, kept.network, name, choice.reason if choice else "")
     if any(trial.interrupted for row_results in trials.values() for trial in row_results):
-        keep_curves(findings, row_trials)
+        results.keep_curves(findings, row_trials)
         raise KeyboardInterrupt  # at once: to judge a network on very many samples takes longer than anybody waits
     where = places(samples, split)
-    tables.append(trial_table(findings, row_trials, kept))
-    measures = trials_frame(trials, where)
-    tables += ranking_tables(findings, settings, trials, measures)
-    errors = error_table(findings, kept, samples, split, where)
-    tables.append(timing_table(findings, kept, samples, split, seconds))
+    tables.append(results.trial_table(findings, row_trials, kept))
+    measures = results.trials_frame(trials, where)
+    tables += results.ranking_tables(findings, settings, trials, measures)
+    errors = results.error_table(findings, kept, samples, split, where)
+    tables.append(results.timing_table(findings, kept, samples, split, seconds))
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)
     data = session.inputs.runs().get("data")
@@ -294,18 +284,10 @@ def train(session: Session) -> Trained | TrainedDynamics:
     )  # fmt: skip
 
 
-def _of_dynamics(session: Session, samples: Transitions) -> TrainedDynamics:
+def _of_dynamics(session: Session, samples: Transitions, split: Split, checkpoints: Path | None) -> TrainedDynamics:
     """Train a network on transitions, and leave the controller over it."""
-    import numpy as np
-
-    from wristctl.learning.dataset import split_samples
-
-    settings, source = session.study.train, session.inputs.get("data")
-    check_dynamics(settings)
-    rng = np.random.default_rng(session.findings.stream("split"))
-    split = split_samples(len(samples.tick), settings.train_share, rng, None, recordings(samples, settings))
-    checkpoints = checkpoints_of(session)
-    (trials,) = train_networks(session, samples, split, networks(settings), checkpoints).values()
+    source, wanted = session.inputs.get("data"), networks(session.study.train)
+    (trials,) = train_networks(session, samples, split, wanted, checkpoints).values()
     known = source.config if isinstance(source, Run) else source.study if source else session.study
     result = keep_dynamics(session, samples, split, trials, known.wrist)
     if checkpoints:

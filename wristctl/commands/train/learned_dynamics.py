@@ -15,6 +15,8 @@ from wristctl.commands.session import Session
 from wristctl.config.learning import TrainSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.records.files import sha256_of
+from wristctl.wrist.directions import in_plane
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +112,6 @@ def keep_dynamics(
 
     from wristctl.learning.learned_dynamics import Dynamics, predicted, save_dynamics
     from wristctl.learning.training_result import best_of
-    from wristctl.records.files import sha256_of
 
     settings, findings = session.study.train, session.findings
     kept = best_of(trials)
@@ -161,7 +162,6 @@ def models(dynamics: Dynamics, samples: Transitions, train: Rows, believed: Wris
     import numpy as np
 
     from wristctl.control.plain_model import plain_one_segment
-    from wristctl.wrist.directions import in_plane
     from wristctl.wrist.segments import segments
 
     planes = ("ulnar", "flexion")[: samples.planes]

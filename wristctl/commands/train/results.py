@@ -1,32 +1,45 @@
-"""Results of a training: the kept network, its errors beside the baselines, and the tests over seeds."""
+"""Results of a training: its answer, the kept network, its errors beside the baselines, and the tests over seeds."""
 
 from __future__ import annotations
 
 import math
+import shlex
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from wristctl.commands.answer import Answer
 from wristctl.commands.gen_data.answer import CLOSED_FORM
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, degrees
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
-from wristctl.commands.train.answer import OF_PLANES
+from wristctl.commands.train.tables import GRID_UNITS, MEANING, UNITS, curves_table, grid_table, predictions_table
+from wristctl.comparison.paper import T1
+from wristctl.comparison.repetition_spread import spread
 from wristctl.config.learning import TrainSettings
+from wristctl.learning.dataset import Samples, Split
+from wristctl.learning.evaluation import ANGLE_MEASURES, MEASURES, Place, error_map, inverses, measures, size_of
+from wristctl.learning.inference import (
+    Polynomial,
+    compiled_exact,
+    compiled_network,
+    compiled_polynomial,
+    microseconds,
+)
+from wristctl.learning.network import Network
+from wristctl.learning.network_file import NETWORK, save_network
+from wristctl.learning.ranking import LEVEL, mean_interval, rank, trained_alike
+from wristctl.learning.selection import THREE, Choice, compare_depths
+from wristctl.learning.training_result import TrainingResult
+from wristctl.records.files import sha256_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from wristctl.learning.dataset import Samples, Split
-    from wristctl.learning.evaluation import Place
-    from wristctl.learning.network import Network
-    from wristctl.learning.selection import Choice
-    from wristctl.learning.training_result import TrainingResult
 
 
 def trials_frame(trials: dict[str, list[TrainingResult]], where: list[Place]) -> pd.DataFrame:
     """A row for each training of each network: every measure that these data have."""
     import pandas as pd
-
-    from wristctl.learning.evaluation import measures
 
     records = [
         {"row": name, "trial": trial.job.trial} | measures(trial, where)
@@ -40,10 +53,6 @@ def ranking_tables(
     findings: Findings, settings: TrainSettings, trials: dict[str, list[TrainingResult]], table: pd.DataFrame
 ) -> list[Table]:
     """Mean and 95 % interval of every measure over the seeds of each network, and what ranking they support."""
-    from wristctl.comparison.repetition_spread import spread
-    from wristctl.learning.evaluation import MEASURES
-    from wristctl.learning.ranking import mean_interval, trained_alike
-
     meaning = {name: text for name, (_, text) in MEASURES.items()}
     findings.table("data/trials.csv", table, {name: unit for name, (unit, _) in MEASURES.items()}, meaning)
     if len(table) < 2:
@@ -73,10 +82,6 @@ def ranking_tables(
 
 def depth_table(findings: Findings, choice: Choice) -> Table:
     """C15: the error of each depth for each activation, and whether three layers are better than others."""
-    import numpy as np
-
-    from wristctl.learning.selection import THREE, compare_depths
-
     rows = []
     for compared in compare_depths(choice.found):
         activation = compared.activation
@@ -106,8 +111,6 @@ def depth_table(findings: Findings, choice: Choice) -> Table:
 
 def _ranked(findings: Findings, settings: TrainSettings, table: pd.DataFrame, label: str, names: list[str]) -> Table:
     """C16: the order of the rows by their error on the test samples, and which differences the seeds support."""
-    from wristctl.learning.ranking import LEVEL, rank
-
     count = settings.seeds
     ranking = rank({name: table.loc[table["row"] == name, "rmse_deg"].to_numpy() for name in names})
     for place, name in enumerate(ranking.order, start=1):
@@ -132,8 +135,6 @@ def _ranked(findings: Findings, settings: TrainSettings, table: pd.DataFrame, la
 
 def _printed(settings: TrainSettings, name: str, measure: str) -> float | None:
     """T1's cell for a row with one of its presets."""
-    from wristctl.comparison.paper import T1
-
     row = next((row for row in settings.rows if row.name == name), settings)
     column = T1.get((row.preset or "").removeprefix("t1-"))
     return getattr(column, measure, None) if column else None
@@ -141,13 +142,17 @@ def _printed(settings: TrainSettings, name: str, measure: str) -> float | None:
 
 def best_row(trials: dict[str, list[TrainingResult]]) -> tuple[str, list[TrainingResult]]:
     """The network whose best training has the least validation loss, and all its trainings."""
-    return min(trials.items(), key=lambda item: min(_losses(item[1])))
+
+    def least(results: list[TrainingResult]) -> float:
+        losses = [result.validation_loss for result in results]
+        return min((loss for loss in losses if math.isfinite(loss)), default=math.inf)
+
+    return min(trials.items(), key=lambda item: least(item[1]))
 
 
 def grid_tables(findings: Findings, choice: Choice) -> list[Table]:
     """The grid's cross-validation, a picture of accuracy against cost, and what it says of the layers."""
     from wristctl.commands.train.figures import accuracy_against_cost
-    from wristctl.commands.train.tables import GRID_UNITS, grid_table
 
     table = grid_table(choice.found)
     findings.table("data/grid.csv", table, units=GRID_UNITS)
@@ -159,15 +164,8 @@ def grid_tables(findings: Findings, choice: Choice) -> list[Table]:
     return [Table(f"Cross-validation: {choice.reason}", heads, rows), depth_table(findings, choice)]
 
 
-def _losses(trials: list[TrainingResult]) -> list[float]:
-    return [trial.validation_loss if math.isfinite(trial.validation_loss) else math.inf for trial in trials]
-
-
 def keep_network(session: Session, network: Network, name: str, reason: str) -> None:
     """The network's file, with a record of its training; `reason` says why it was chosen."""
-    from wristctl.learning.network_file import NETWORK, save_network
-    from wristctl.records.files import sha256_of
-
     run, settings = session.findings.run, session.study.train
     if run is None:
         return
@@ -186,8 +184,6 @@ def keep_network(session: Session, network: Network, name: str, reason: str) -> 
 
 def keep_curves(findings: Findings, trials: list[TrainingResult]) -> pd.DataFrame:
     """curves.csv: the errors of every training over its epochs."""
-    from wristctl.commands.train.tables import MEANING, UNITS, curves_table
-
     curves: pd.DataFrame = curves_table([epoch for trial in trials for epoch in trial.epochs])
     findings.table("data/curves.csv", curves, UNITS, MEANING)
     return curves
@@ -195,8 +191,6 @@ def keep_curves(findings: Findings, trials: list[TrainingResult]) -> pd.DataFram
 
 def trial_table(findings: Findings, trials: list[TrainingResult], kept: TrainingResult) -> Table:
     """The course of every training of the kept network."""
-    import numpy as np
-
     from wristctl.commands.train.figures import learning_curves
 
     curves = keep_curves(findings, trials)
@@ -227,8 +221,6 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
         predicted_angles,
         worst_over_lengths,
     )
-    from wristctl.commands.train.tables import MEANING, UNITS, predictions_table
-    from wristctl.learning.evaluation import ANGLE_MEASURES, error_map, inverses, size_of
 
     network, test = kept.network, where[0]
     beside = inverses(kept, samples, split)
@@ -287,14 +279,6 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
 
 def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, split: Split, seconds: float) -> Table:
     """Time to compute one angle. `seconds` is the time of the training [s]."""
-    from wristctl.learning.inference import (
-        Polynomial,
-        compiled_exact,
-        compiled_network,
-        compiled_polynomial,
-        microseconds,
-    )
-
     inputs = samples.inputs[split.test]
     columns = kept.network.sizes[0]
     polynomial = Polynomial.fit(samples.inputs[split.train], samples.theta[split.train])
@@ -310,3 +294,46 @@ def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, spl
 
 def _key(name: str) -> str:
     return name.replace(" ", "_").replace("-", "_")
+
+
+# Heads of the errors in each of two planes, last in the table of errors.
+OF_PLANES = ("ulnar [deg]", "flexion [deg]")
+
+# The closed form's name in the table of errors.
+_CLOSED_FORM = "exact inverse"
+
+
+def answer_of(
+    errors: Table, held_out: int, kept: tuple[str, int], run: str, data: str = "", segments: int = 1
+) -> Answer:
+    """What the network is worth on `held_out` test samples.
+
+    `errors` has a row for each inverse and place, as `error_table` makes it. `kept` is the name of the one of so many
+    networks; `run` is the path of the run, empty in memory; `data` that of the run with the samples, empty where the
+    training drew its own, of a wrist of so many segments.
+    """
+    from wristctl.learning.network_file import NETWORK
+
+    name, networks = kept
+    planes = 2 if errors.columns[-2:] == OF_PLANES else 1
+    network, closed = (next(row for row in errors.rows if row[0] == inverse) for inverse in ("network", _CLOSED_FORM))
+    over = ""
+    if planes == 2:
+        ulnar, flexion = map(_deg, network[-2:])
+        over = f" over both planes ({ulnar} deg toward ulnar, {flexion} deg toward flexion)"
+    sentence = (
+        f"On {held_out} samples that it was not trained on the network{f' {name}' * (networks > 1)} has an RMSE of "
+        f"{_deg(network[3])} deg{over}, at most {_deg(network[4])} deg off. The closed form {CLOSED_FORM[planes]} has "
+        f"one of {_deg(closed[3])} deg, at most {_deg(closed[4])} deg off."
+    )
+    notes = [f"It is the one of {networks} networks with the least validation loss."] * (networks > 1)
+    if run:
+        cut = ["--set", "loop.planes=2"] * (planes == 2) + ["--set", f"loop.plant_segments={segments}"] * (segments > 1)
+        words = ["wristctl", "simulate", f"{data or run}/config.yaml", "--set", "reference.inverse=network", *cut]
+        notes += ["Next, one motion of this wrist through this network:", f"$ {shlex.join([*words, '--network', run])}"]
+    more = f"All tables: --all. The network: {run}/{NETWORK}" if run else "All tables: `.tables`."
+    return Answer(sentence, errors, notes, more)
+
+
+def _deg(error_deg: float) -> str:
+    return degrees(math.radians(error_deg)) if math.isfinite(error_deg) else "-"

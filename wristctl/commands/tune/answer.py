@@ -5,21 +5,24 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+import numpy as np
+
+from wristctl.arrays import Array
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.quantities import Quantity, table_of
 from wristctl.commands.ranking_answer import gains_words
-
-if TYPE_CHECKING:
-    from wristctl.arrays import Array
-    from wristctl.config.loop import Loop, Reference
-    from wristctl.config.wrist import WristParameters
-    from wristctl.simulation.cases import Case
-    from wristctl.tuning.margin import Stood
-    from wristctl.tuning.search import Search
+from wristctl.comparison.bootstrap import MEASURABLE
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.simulation.cases import Case, measure
+from wristctl.tuning.margin import Stood
+from wristctl.tuning.objective import YARDSTICK, marks_of
+from wristctl.tuning.search import SEARCHED, Search, first_tried
 
 # Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
 _EDGE = 0.01
@@ -86,12 +89,6 @@ def beside_feedforward(
     gains: Mapping[str, Mapping[str, float]], cases: Sequence[Case], wrist: WristParameters
 ) -> dict[str, Beside]:
     """Error of each controller's gains beside feedforward; errors too small to be measured count alike."""
-    import numpy as np
-
-    from wristctl.comparison.bootstrap import MEASURABLE
-    from wristctl.control.table import controller
-    from wristctl.simulation.cases import measure
-    from wristctl.tuning.objective import YARDSTICK
 
     def errors(name: str, values: Mapping[str, float]) -> Array:
         law = controller(name)
@@ -109,12 +106,6 @@ def beside_feedforward(
 
 def starts_of(searches: Mapping[str, Search], cases: Sequence[Case], wrist: WristParameters) -> dict[str, Start]:
     """The best preset of each controller for which a search found better gains, on the cases these were chosen by."""
-    import numpy as np
-
-    from wristctl.control.table import controller
-    from wristctl.tuning.objective import marks_of
-    from wristctl.tuning.search import first_tried
-
     presets = {name: search.best_preset for name, search in searches.items() if not _preset_of(search)}
     found = {name: preset for name, preset in presets.items() if preset is not None}
     gains = {name: dict(zip(controller(name).gains, preset.gains, strict=True)) for name, preset in found.items()}
@@ -244,19 +235,15 @@ def _passed_over(
 
 def _preset_of(search: Search) -> str:
     """The preset that nothing better was found than, also where the search came upon it; empty where something was."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import SEARCHED
-
     if not search.finalists:
         return ""
     if search.finalists[0].origin != SEARCHED:
         return search.finalists[0].origin
-    return next((name for name, gains in controller(search.controller).presets.items() if _same(search, gains)), "")
 
+    def same(gains: Mapping[str, float]) -> bool:
+        return all(math.isclose(value, gains[name], rel_tol=_DIGITS) for name, value in search.gains.items())
 
-def _same(search: Search, gains: Mapping[str, float]) -> bool:
-    """Whether gains are what a search found, to the four digits that are printed."""
-    return all(math.isclose(value, gains[name], rel_tol=_DIGITS) for name, value in search.gains.items())
+    return next((name for name, gains in controller(search.controller).presets.items() if same(gains)), "")
 
 
 def _next(file: str, motion: Motion) -> list[str]:
@@ -321,19 +308,16 @@ def searches_table(
 
 def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> str:
     """Gains that lie at an end of the range in which they were searched: beyond it may be better ones."""
-    lines = []
-    for name in ordered:
-        lines += [
-            f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
-            for gain, value, low, high, unit in at_edge(searches[name])
-        ]
+    lines = [
+        f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
+        for name in ordered
+        for gain, value, low, high, unit in at_edge(searches[name])
+    ]
     return " ".join(lines) or "No gain lies at the edge of the box that was searched."
 
 
 def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
     """Gains within 1 % of an end of their search box, by its logarithmic scale: name, value, ends, unit."""
-    from wristctl.control.table import controller
-
     table = controller(search.controller).gains
     near = []
     for name, value in search.gains.items():
@@ -346,11 +330,8 @@ def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
 
 def _presets(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
     """Controllers for which the search found nothing better than a preset."""
-    lines = []
-    for name in ordered:
-        if preset := _preset_of(searches[name]):
-            lines.append(f"For {name} nothing better than the preset {preset} was found.")
-    return [" ".join(lines)] * bool(lines)
+    presets = {name: preset for name in ordered if (preset := _preset_of(searches[name]))}
+    return [f"For {name} nothing better than the preset {preset} was found." for name, preset in presets.items()]
 
 
 def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> str:

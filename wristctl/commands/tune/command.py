@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_search,
     check_family_reach,
     check_inverses,
     check_reach,
+    check_searched,
     family_of,
     identified,
     inverses_of,
@@ -21,49 +21,25 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     why_two_planes,
 )
-from wristctl.commands.kept_studies import asked_for, file_of, hw_run_fits, keep_gains, rig_of, row_of
-from wristctl.commands.loop_warnings import (
-    asked_by,
-    refuse_out_of_reach,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_of_one_plane,
-    warn_out_of_reach,
-)
+from wristctl.commands.loop_warnings import refuse_out_of_reach, warn_of_loops
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import (
-    Beside,
-    Motion,
-    Start,
-    answer_of,
-    beside_feedforward,
-    searches_table,
-    starts_of,
-)
-from wristctl.commands.tune.searches import search_all
-from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
-from wristctl.config.tune import TuneSettings
 from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.commands.tune.answer import Beside, Start
     from wristctl.simulation.closed_loop import Size
-    from wristctl.tuning.margin import OwnLoop, Stood
+    from wristctl.tuning.margin import Stood
     from wristctl.tuning.search import Search
-    from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
 _ELSEWHERE = 6
-# Seconds in which the margins of a controller are found.
-_MARGINS = 0.1
-# Share of what a family draws at which one of its motions is tried.
-_WITHIN = 0.75
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -94,6 +70,9 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
+        from wristctl.commands.tune.answer import answer_of
+        from wristctl.commands.tune.searches import motion_of
+
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
         return answer_of(*found, motion, self.stood, self.bending, self.starts)
@@ -139,29 +118,25 @@ def planned_search(study: Study, inputs: Inputs) -> str:
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import check_size
     from wristctl.simulation.planes import planes_of
-    from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
+    from wristctl.tuning.search import check_loops, check_optimiser
 
-    settings, families = study.tune, study.families
-    for number, name in enumerate(settings.controllers):
-        try:
-            check_tunable(controller(name))
-        except UserError as error:
-            raise error.at(f"controllers.{number}") from error
+    settings = study.tune
+    check_searched(settings.controllers)
     try:
         check_optimiser(settings)
     except UserError as error:
         raise error.at(str(error.where).removeprefix("tune.")) from error
+    references: Sequence[Reference] = [scenario.reference for scenario in settings.scenarios]
     if settings.worlds.family:
-        family_of(families, settings.worlds.family, "worlds.family")
+        references = family_of(study.families, settings.worlds.family, "worlds.family").references
     else:
         check_loops(settings)
     planes = planes_of(study.wrist, asked_of_search(study))
     if not settings.worlds.family:
-        references = [scenario.reference for scenario in settings.scenarios]
         check_reach(references, study.wrist, "scenarios.{}.reference", planes)
     asked = size(study)
     check_size(asked, planes)
-    check_inverses(inverses_of(_references(settings, families)), inputs)
+    check_inverses(inverses_of(references), inputs)
     times = {name: controller(name).learning for name in settings.controllers}
     told = f"{asked.rollouts // sum(times.values())} rollouts of {asked.horizon:g} s for each of {', '.join(times)}"
     return told + "".join(f", {n} times as many for {name}, which learns" for name, n in times.items() if n > 1)
@@ -189,6 +164,8 @@ def tune(session: Session) -> Tuned:
     import numpy as np
 
     from wristctl.commands.truth_table import truth_tables
+    from wristctl.commands.tune.answer import beside_feedforward, searches_table, starts_of
+    from wristctl.commands.tune.searches import keep_files, margins, search_all, tried_elsewhere
     from wristctl.control.table import controller
     from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
@@ -196,10 +173,7 @@ def tune(session: Session) -> Tuned:
 
     study = identified(session.study, "tune", session.inputs)
     loops = judged_loops(study, study.tune).values()
-    warn_if_it_buckles(session.findings, study.wrist, loops)
-    warn_if_coarse(loops)
-    warn_of_one_plane(study.wrist, asked_of_search(study))
-    warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
+    warn_of_loops(session.findings, study, study.tune, asked_of_search(study))
     planes = 2 if why_two_planes(study.wrist, asked_of_search(study)) else 1
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
@@ -208,108 +182,20 @@ def tune(session: Session) -> Tuned:
     searches = search_all(session, study, network, tried)
     gains = {name: best.gains for name, best in searches.items()}
     with session.progress("trying the gains found"):
-        lost = {
-            name: marks_of(law, np.array(law.values(gains[name])), cases, study.wrist)
-            for name, law in ((name, controller(name)) for name in gains)
-        }
+        laws = {name: controller(name) for name in gains}
+        values = {name: np.array(law.values(gains[name])) for name, law in laws.items()}
+        lost = {name: marks_of(law, values[name], cases, study.wrist) for name, law in laws.items()}
         errors, starts = beside_feedforward(gains, cases, study.wrist), starts_of(searches, cases, study.wrist)
     title = "Tuned gains, best first; objective in decades beside feedforward"
     tables = [searches_table(searches, errors, lost, len(cases), title)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    elsewhere = _elsewhere(session, study, network, gains)
-    stood = _stood(session, own_loop(study, searched, network), gains)
-    _write_files(session.findings, study, gains)
+    elsewhere = tried_elsewhere(session, study, network, gains)
+    stood = margins(session, own_loop(study, searched, network), gains)
+    keep_files(session.findings, study, gains)
     bending = why_two_planes(study.wrist, asked_of_search(study))
     return Tuned(
         session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, stood, bending, starts
     )
-
-
-def motion_of(study: Study, run: str) -> Motion:
-    """One motion of those that gains were searched on: of a family its loop, and a motion within what is drawn."""
-    settings, family = study.tune, study.families.get(study.tune.worlds.family)
-    loops, horizon = judged_loops(study, settings), settings.horizon
-    if family is not None:
-        name, horizon = settings.worlds.family, family.horizon
-        reference = family.motion(0, dict.fromkeys(family.draw, _WITHIN))
-    else:
-        name, reference = settings.scenarios[0].loop, settings.scenarios[0].reference
-        loops = {scenario.loop: loops[scenario.loop] for scenario in settings.scenarios}
-    where = f"the loop {name}" if family is None else f"the loop of the worlds {name}"
-    through = settings.network if settings.network and reference.inverse == "network" else ""
-    network = str(Path(run).parent / through) if through else ""
-    return Motion(name, loops, reference, horizon, where, hw_run_fits(study, loops[name]), network)
-
-
-def _write_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[str, float]]) -> None:
-    """A study file for each controller: its gains, and what they were searched on."""
-    tried = motion_of(study, "")
-    loops = {name: loop.model_dump(mode="json") for name, loop in tried.loops.items()}
-    asked = {"loop": loops[tried.name], "reference": asked_for(tried.reference), "horizon": tried.horizon}
-    trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
-    for name, values in gains.items():
-        title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
-        rows = [row_of(name, values)]
-        keep_gains(findings, file_of(name), title, study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
-
-
-def _stood(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
-    """How much the gains of each controller stand on the loop that they were tuned for, kept as a table."""
-    import numpy as np
-    import pandas as pd
-
-    from wristctl.control.table import controller
-
-    stood = dict[str, "Stood"]()
-    with session.progress("looking for margins", total=len(gains), unit="controllers") as advance:
-        for number, (name, values) in enumerate(gains.items(), start=1):
-            law = controller(name)
-            stood[name] = own.stood(law, np.array(law.values(values)))
-            advance(number)
-    if stood:
-        rows = [{"controller": name, **changes._asdict()} for name, changes in stood.items()]
-        session.findings.table("data/margins.csv", pd.DataFrame(rows), units=dict.fromkeys(rows[0], "1"))
-    return stood
-
-
-def _elsewhere(
-    session: Session, study: Study, network: Inverse | None, gains: Mapping[str, Mapping[str, float]]
-) -> dict[str, dict[str, dict[str, int]]]:
-    """Try gains with the motions of the scenarios on the loops that none of these is on: marks by controller and loop.
-
-    Plain Python is not tried on loops that it cannot keep up with.
-    """
-    import numpy as np
-
-    from wristctl.control.table import controller
-    from wristctl.simulation.closed_loop import Size
-    from wristctl.tuning.objective import marks_of
-    from wristctl.tuning.search import tuning_cases
-
-    settings = study.tune
-    searched = {scenario.loop for scenario in settings.scenarios}
-    others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
-    tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    loops = [settings.loops[name] for name in others]
-    efforts = [loop.plant_segments * Size([loop], settings.horizon).steps for loop in loops]
-    done, whole = 0.0, sum(efforts) * len(gains)
-    with session.progress("trying the gains on other loops", 100, "%", after=_MARGINS * len(gains)) as report:
-        for loop, effort in zip(others, efforts, strict=True):
-            scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
-            elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
-            cases = tuning_cases(elsewhere, network)[0]
-            for name, values in gains.items():
-                law = controller(name)
-                if law.keeps_up(settings.loops[loop].control_period):
-                    tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
-                done += effort
-                report(round(100.0 * done / whole))
-    return tried
-
-
-def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
-    family = settings.worlds.family
-    return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
 
 
 TUNE = sweepable(
@@ -317,11 +203,7 @@ TUNE = sweepable(
         "tune",
         plan,
         tune,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            FROM_IDENTIFIED,
-            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
-        ),
+        (NETWORK, FROM_IDENTIFIED, EarlierRun("resume", kind="tune", optional=True, unfinished=True)),
         doubts=refuse_out_of_reach,
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_search(study)),

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.control.law import Gain
@@ -68,7 +67,8 @@ def convergence(searches: Sequence[Search]) -> Figure:
 def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
     """Every gain over the iterations, on the decades of its search box: best so far, the swarm's median and 10-90 %."""
     picture, axes = figure(len(gains), 1, height=0.9 + 1.6 * len(gains), sharex=True)
-    iterations, best = _iterations(search), _best_so_far(search)
+    values, best = search.tried.values, _best_so_far(search)
+    iterations = np.arange(1, len(values) + 1)
     for index, (panel, (name, gain)) in enumerate(zip(axes[:, 0], gains.items(), strict=True)):
         low, median, high = np.percentile(search.tried.gains[:, :, index], (10.0, 50.0, 90.0), axis=1)
         line_colour = colour(search.controller)
@@ -86,15 +86,10 @@ def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
     return picture
 
 
-def _iterations(search: Search) -> NDArray[np.int_]:
-    """Numbers of the iterations, from 1."""
-    return np.arange(1, len(search.tried.values) + 1)
-
-
 def _best_so_far(search: Search) -> Array:
     """Gains of the best candidate up to each iteration, (I, g)."""
     values = search.tried.values
-    gains_of_least = search.tried.gains[_iterations(search) - 1, values.argmin(axis=1)]
+    gains_of_least = search.tried.gains[np.arange(len(values)), values.argmin(axis=1)]
     least = np.minimum.accumulate(values.min(axis=1))
     better = np.concatenate([[True], least[1:] < least[:-1]])
     best_gains: Array = gains_of_least[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]

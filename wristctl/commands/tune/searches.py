@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
+import numpy as np
+import pandas as pd
+
+from wristctl.commands.inputs_of_loops import judged_loops
+from wristctl.commands.kept_studies import asked_for, file_of, gains_content, hw_run_fits, keep_study, rig_of, row_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Done, Session
+from wristctl.commands.tune.answer import Motion
 from wristctl.config.study import Study
-
-if TYPE_CHECKING:
-    from wristctl.tuning.objective import Judge
-    from wristctl.tuning.search import Search, Tried
-    from wristctl.wrist.kinematics import Inverse
+from wristctl.control.table import controller, write_gains
+from wristctl.simulation.closed_loop import Size, scenario_of
+from wristctl.simulation.drawn_worlds import streams_of
+from wristctl.simulation.worlds import Draws
+from wristctl.tuning.margin import CHANGES, OwnLoop, Stood
+from wristctl.tuning.objective import Judge, marks_of
+from wristctl.tuning.search import Search, Tried, finalists, history, judges_of, search, tried_of, tuning_cases
+from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout at short steps over that of a search's; rollouts whose time an iteration takes beside those that it
 # runs; candidates of it that are looked at closely.
 _CLOSELY, _BESIDE, _PROMISING = 1.2, 20, 2
-# Seconds that the figures of a controller take.
-_DRAWN = 1.0
+# Seconds that the figures of a controller take, and in which its margins are found.
+_DRAWN, _MARGINS = 1.0, 0.1
+# Share of what a family draws at which one of its motions is tried.
+_WITHIN = 0.75
 
 
 def search_all(session: Session, study: Study, network: Inverse | None, then: float = 0.0) -> dict[str, Search]:
@@ -25,10 +37,6 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
 
     `then` are the rollouts that the command runs after it, for each controller.
     """
-    from wristctl.control.table import controller
-    from wristctl.tuning.margin import CHANGES
-    from wristctl.tuning.search import judges_of, search
-
     settings = study.tune
     _note_streams(session, study)
     judge, choose = judges_of(study, network)
@@ -59,10 +67,6 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
 
 
 def _note_streams(session: Session, study: Study) -> None:
-    from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.simulation.worlds import Draws
-
     settings = study.tune
     if settings.worlds.family:
         name = settings.worlds.family
@@ -78,9 +82,6 @@ def _note_streams(session: Session, study: Study) -> None:
 
 def _known(session: Session, name: str) -> Tried | None:
     """Gains of a controller that the run to resume has tried."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import tried_of
-
     stopped = session.inputs.runs().get("resume")
     if stopped is None or not stopped.has(f"data/history-{name}.csv"):
         return None
@@ -90,8 +91,6 @@ def _known(session: Session, name: str) -> Tried | None:
 def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None:
     """Keep what was found, also of a search that was cut short."""
     from wristctl.commands.tune.figures import convergence, gain_history, tornado
-    from wristctl.control.table import controller, write_gains
-    from wristctl.tuning.search import finalists, history
 
     if not searches:
         return
@@ -113,3 +112,74 @@ def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None
         findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
     findings.headline(*(f"{name}_objective" for name in sorted(searches, key=lambda name: searches[name].objective)))
     findings.figure("convergence", convergence, list(searches.values()), caption="Best objective against the budget")
+
+
+def motion_of(study: Study, run: str) -> Motion:
+    """One motion of those that gains were searched on: of a family its loop, and a motion within what is drawn."""
+    settings, family = study.tune, study.families.get(study.tune.worlds.family)
+    loops, horizon = judged_loops(study, settings), settings.horizon
+    if family is not None:
+        name, horizon = settings.worlds.family, family.horizon
+        reference = family.motion(0, dict.fromkeys(family.draw, _WITHIN))
+    else:
+        name, reference = settings.scenarios[0].loop, settings.scenarios[0].reference
+        loops = {scenario.loop: loops[scenario.loop] for scenario in settings.scenarios}
+    where = f"the loop {name}" if family is None else f"the loop of the worlds {name}"
+    through = settings.network if settings.network and reference.inverse == "network" else ""
+    network = str(Path(run).parent / through) if through else ""
+    return Motion(name, loops, reference, horizon, where, hw_run_fits(study, loops[name]), network)
+
+
+def keep_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[str, float]]) -> None:
+    """A study file for each controller: its gains, and what they were searched on."""
+    tried = motion_of(study, "")
+    loops = {name: loop.model_dump(mode="json") for name, loop in tried.loops.items()}
+    asked = {"loop": loops[tried.name], "reference": asked_for(tried.reference), "horizon": tried.horizon}
+    trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
+    for name, values in gains.items():
+        title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
+        rows = [row_of(name, values)]
+        content = gains_content(study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
+        keep_study(findings, file_of(name), title, content)
+
+
+def margins(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
+    """How much the gains of each controller stand on the loop that they were tuned for, kept as a table."""
+    stood = dict[str, "Stood"]()
+    with session.progress("looking for margins", total=len(gains), unit="controllers") as advance:
+        for number, (name, values) in enumerate(gains.items(), start=1):
+            law = controller(name)
+            stood[name] = own.stood(law, np.array(law.values(values)))
+            advance(number)
+    if stood:
+        rows = [{"controller": name, **changes._asdict()} for name, changes in stood.items()]
+        session.findings.table("data/margins.csv", pd.DataFrame(rows), units=dict.fromkeys(rows[0], "1"))
+    return stood
+
+
+def tried_elsewhere(
+    session: Session, study: Study, network: Inverse | None, gains: Mapping[str, Mapping[str, float]]
+) -> dict[str, dict[str, dict[str, int]]]:
+    """Try gains with the motions of the scenarios on the loops that none of these is on: marks by controller and loop.
+
+    Plain Python is not tried on loops that it cannot keep up with.
+    """
+    settings = study.tune
+    searched = {scenario.loop for scenario in settings.scenarios}
+    others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
+    tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
+    loops = [settings.loops[name] for name in others]
+    efforts = [loop.plant_segments * Size([loop], settings.horizon).steps for loop in loops]
+    done, whole = 0.0, sum(efforts) * len(gains)
+    with session.progress("trying the gains on other loops", 100, "%", after=_MARGINS * len(gains)) as report:
+        for loop, effort in zip(others, efforts, strict=True):
+            scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
+            elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
+            cases = tuning_cases(elsewhere, network)[0]
+            for name, values in gains.items():
+                law = controller(name)
+                if law.keeps_up(settings.loops[loop].control_period):
+                    tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
+                done += effort
+                report(round(100.0 * done / whole))
+    return tried
