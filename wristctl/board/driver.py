@@ -9,14 +9,11 @@ from typing import Any, Protocol, Self
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
 from wristctl.board.exchange import Exchange, Overheard, Traffic, nobody
 from wristctl.board.framing import crc
+from wristctl.board.layout import ANSWER_TO, BOUND, COMMAND_OF, LAYOUTS
 from wristctl.board.messages import (
-    ANSWER_TO,
     AXES,
-    BOUND,
-    COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
-    LAYOUTS,
     MAX_RATE,
     TOTAL_RATE,
     Command,

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from wristctl.board.board_errors import NoAnswer
 from wristctl.board.framing import Decoder, WireFrame, encode
-from wristctl.board.messages import ESTOP_SEQ, FEEDS_WATCHDOG, Command
+from wristctl.board.layout import FEEDS_WATCHDOG
+from wristctl.board.messages import ESTOP_SEQ, Command
 from wristctl.board.transport import Transport
 
 _ANSWER = 0x80

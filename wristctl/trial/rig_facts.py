@@ -10,7 +10,8 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.check import Adapter, RoundTrips, adapter_of, round_trips, shorter
 from wristctl.board.driver import Board
-from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
+from wristctl.board.layout import LAYOUTS
+from wristctl.board.messages import Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces, stale_for
