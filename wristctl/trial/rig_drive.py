@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.messages import State
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.rig import value
 from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.camera_pace import CameraPaces
+from wristctl.trial.drives import Heard
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.rig_words import AGAINST
 from wristctl.trial.safety import SafetyStop
@@ -34,9 +34,6 @@ class RigDrive:
     the motors are, they are as far from there as when they were looked at.
     """
 
-    lapses, resent = 0, 0
-    state, faults = State.ENABLED, ""
-
     def __init__(self, rig: GuardedRig, settings: HwRunSettings, zero: Array) -> None:
         facts = rig.facts
         self._rig, self._zero, self._period = rig, np.asarray(zero, float), settings.control_period
@@ -45,7 +42,8 @@ class RigDrive:
         self._motor = Follower(delay, lag, facts.limits.rate / self._step)
         self._ahead, self._fastest = delay + lag + 0.5 * self._period, self._motor.speed * self._period
         self._target = self._place = np.zeros(len(self._zero))
-        self._sent, self.counted = np.zeros(len(self._zero)), 0.0
+        self.sent, self._counted = np.zeros(len(self._zero)), 0.0
+        """Rates that the last targets ask for (T,) [1/s], and when the places were reckoned [s]."""
         self._remembered: deque[Array] = deque(maxlen=remembered_commands(delay, self._period))
         self._reckoned_at, self._off = deque[tuple[float, Array]](maxlen=_REMEMBERED), np.zeros(len(self._zero))
 
@@ -61,26 +59,16 @@ class RigDrive:
 
     def begin(self) -> None:
         """The motors stand where they were sent last."""
-        self._place, self._sent = self._target, np.zeros(len(self._zero))
+        self._place, self.sent = self._target, np.zeros(len(self._zero))
         self._remembered.extend([self._target] * (self._remembered.maxlen or 0))
-        self.counted = self._rig.now()
+        self._counted = self._rig.now()
         self._reckoned_at.clear()
-        self._reckoned_at.append((self.counted, self._place))
+        self._reckoned_at.append((self._counted, self._place))
 
     @property
-    def time(self) -> float:
-        """Of the rig's clock when the places were reckoned."""
-        return self.counted
-
-    @property
-    def round_trip(self) -> float:
-        """Seconds that the last `send` took."""
-        return self._rig.took
-
-    @property
-    def sent(self) -> Array:
-        """Rates that the last targets ask for (T,) [1/s]."""
-        return self._sent
+    def heard(self) -> Heard:
+        """As reckoned; a rig that does not follow raises."""
+        return Heard(self._counted, self._counted, self._rig.took)
 
     @property
     def tension(self) -> Array:
@@ -112,7 +100,7 @@ class RigDrive:
         return self._place + self._off
 
     def lead(self, target: Array, moving: Array) -> Array:
-        """As `LoopDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
+        """As `BoardDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
         wanted = target + moving * self._ahead
         self._send(self._target + np.clip(wanted - self._target, -self._fastest, self._fastest))
         behind = wanted - self._target
@@ -125,20 +113,20 @@ class RigDrive:
     def _send(self, steps: Array) -> None:
         sent = self._rig.send(self._zero + steps * (self._step / self._unit))
         before, self._target = self._target, (sent - self._zero) * (self._unit / self._step)
-        self._sent = (self._target - before) / self._period
+        self.sent = (self._target - before) / self._period
 
     def listen(self, until: float) -> None:
         """A rig answers when it is asked."""
 
     def go_on(self, ticks: int) -> list[Array]:
-        """As `LoopDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
+        """As `BoardDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
         means = []
         for _ in range(ticks):
             self._remembered.appendleft(self._target)
             self._place, mean = self._motor.over(self._place, np.array(self._remembered).T, self._period)
             means.append(mean + self._off)
             self._reckoned_at.append((self._reckoned_at[-1][0] + self._period, self._place))
-        self.counted = self._rig.now()
+        self._counted = self._rig.now()
         return means
 
 
