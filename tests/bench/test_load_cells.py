@@ -123,7 +123,7 @@ def test_without_cells_all_are_silent(host_on: HostOn) -> None:
 
 def test_a_weight_that_a_bystander_hangs_on_a_cell_is_read(host_on: HostOn) -> None:
     host = host_on(settings())
-    rig = host.bench._rig
+    rig = host.bench
     before = newtons(newest(host))
     bystander = Bystander(rig, -1)
     bystander.do("hang 3 2.5")

@@ -125,7 +125,7 @@ class Spoiled(VirtualCamera):
         frame = super().newest()
         if frame is None:
             return None
-        time = frame.time - self._bench._rig.faults._starts["first trial"] - AT
+        time = frame.time - self._bench.faults._starts["first trial"] - AT
         return frame if time < 0.0 else frame._replace(image=self._spoil(frame.image, time))
 
 
