@@ -55,6 +55,7 @@ class Exchange:
     def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport, self._overheard = transport, overheard
         self.traffic = Traffic()
+        """Counts of the traffic on the wire."""
         self.round_trip = 0.0
         """Seconds from the last command that was answered to its answer."""
         self.silence = 0.0

@@ -184,7 +184,7 @@ def _direction_of(axis: int, bend: Bend, expected: ExpectedMoves) -> AxisDirecti
     return AxisDirection(axis, math.atan2(bend.away, bend.theta), expected.place(axis), astray)
 
 
-def _watched(tracking: Tracking, testbed: Testbed) -> tuple[tuple[CameraPace, ...], list[Sighting]]:
+def _watched(tracking: Tracking, testbed: Testbed) -> tuple[list[CameraPace], list[Sighting]]:
     clock, paces, sightings = testbed.transport, CameraPaces(), []
     paces.expect(len(tracking.zero))
     tracking.look()
@@ -282,7 +282,7 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
     else:
-        met += _of_two_lost(pace.oldest_after(2) + hidden, pace.whose, settings.safety.stale)
+        met += _of_two_lost(pace.oldest(2) + hidden, pace.whose, settings.safety.stale)
     if pace.jitter * pace.rate > _UNEVEN:
         problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))

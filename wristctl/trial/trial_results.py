@@ -62,8 +62,6 @@ FURTHER: Mapping[str, tuple[str, str]] = {
 ELLIPSE = tuple(f"error_{name}" for name in ErrorEllipse._fields)
 # File of a run that has the live reference as it was followed.
 RECORD = "data/reference.csv"
-# Share of the largest bend within which an error is small.
-_BAND = 0.02
 # Seconds before the push over which the load is taken as quiet.
 _BEFORE = 0.5
 # Seconds by which a person may push too early.
