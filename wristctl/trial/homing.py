@@ -12,7 +12,7 @@ rests after bends to all sides.
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -118,14 +118,19 @@ def rest_of(board: Motors, tracking: Tracking, expected: ExpectedMoves, homing: 
 
 
 class Finder:
-    """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
+    """Finds zero of enabled motors with slack tendons, one axis at a time.
+
+    Positions are microsteps reeled in from where the finder began.
+    """
 
     def __init__(
-        self, board: Motors, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves,
-        judge_slack: Callable[[Bend], None],
+        self, board: Motors, tracking: Tracking, rig: RigSettings, wrist: WristParameters, plane: str,
+        expected: ExpectedMoves,
     ) -> None:  # fmt: skip
-        self._board, self._tracking, self._settings, self._expected = board, tracking, settings, expected
-        self._spools, self._judge_slack = spools, judge_slack
+        self._board, self._tracking, self._expected = board, tracking, expected
+        self._settings, self._spools = (settings := rig.homing), (spools := spools_of(rig.actuator))
+        planes = names_of_planes(rig.planes, plane)
+        self._judge_slack = partial(judge_slack, settings=rig, wrist=wrist, planes=planes)
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
         )
@@ -279,16 +284,6 @@ def slacken(
     return position
 
 
-def finder_of(
-    board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
-    expected: ExpectedMoves,
-) -> Finder:  # fmt: skip
-    """What finds zero of enabled motors with slack tendons."""
-    planes = names_of_planes(settings.planes, plane)
-    sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
-    return Finder(board, tracking, spools_of(settings.actuator), settings.homing, expected, sags)
-
-
 def find_zero(
     board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
     signs: Sequence[int] | None = None, layout: TendonLayout | None = None,
@@ -301,7 +296,7 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
-    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.plus)
+    finder, count = Finder(board, tracking, settings, wrist, plane, expected), len(expected.plus)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(count)]
     finder.slacken()
     lines, straight, taut = finder.lines(about)

@@ -282,22 +282,17 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
     else:
-        met += _of_two_lost(pace.oldest(2) + hidden, pace.whose, settings.safety.stale)
+        if (oldest := pace.oldest(2) + hidden) > settings.safety.stale:
+            problem = (
+                f"where two pictures{pace.whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old "
+                f"before the next: beyond safety.stale ({1e3 * settings.safety.stale:.0f} ms), that ends a trial"
+            )
+            fix = f"a faster mode of the camera, or --set safety.stale={stale_for(oldest):g}"
+            met.append(Trouble(False, problem, fix))
     if pace.jitter * pace.rate > _UNEVEN:
         problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
     return met
-
-
-def _of_two_lost(oldest: float, whose: str, stale: float) -> list[Trouble]:
-    """Trouble where two pictures in a row are lost: the angle is `oldest` [s] before the next, more than `stale`."""
-    if oldest <= stale:
-        return []
-    problem = (
-        f"where two pictures{whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old before the "
-        f"next: beyond safety.stale ({1e3 * stale:.0f} ms), that ends a trial"
-    )
-    return [Trouble(False, problem, f"a faster mode of the camera, or --set safety.stale={stale_for(oldest):g}")]
 
 
 def _of_the_age(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:

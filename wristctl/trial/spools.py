@@ -41,7 +41,6 @@ class Spools:
 
     step: float
     """Tendon moved by one microstep [m]."""
-    pulley_radius: float
     stiffness: float
     """Stiffness of one tendon [N/m]."""
     speed: float
@@ -50,10 +49,6 @@ class Spools:
     """Largest change of it by the host [1/s^2]."""
     timing: Timing
     """Of the board, as believed; lengths in steps."""
-
-    def torque(self, tension: Array) -> Array:
-        """Torque at the pulley [N m] that these tensions [N] ask of the motors."""
-        return tension * self.pulley_radius
 
     def target(self, tension: Array, taut: Array) -> Array:
         """Positions [steps] at which tendons that are taut when reeled in by `taut` [m] have these tensions [N]."""
@@ -99,7 +94,6 @@ def spools_of(actuator: Actuator) -> Spools:
     """The spools of an actuator section."""
     return Spools(
         actuator.step_length,
-        actuator.pulley_radius,
         actuator.tendon_stiffness,
         actuator.step_rate,
         actuator.step_acceleration,
