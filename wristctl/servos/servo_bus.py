@@ -152,8 +152,7 @@ class ServoBus:
 
     def answering(self) -> list[int]:
         """Ids that answer now."""
-        return [number for number in self._ids if any(self._packets.ping(self._port, number)[1] == self._fine
-                                                      for _ in range(2))]  # fmt: skip
+        return [number for number in self._ids if self.pinged(number) or self.pinged(number)]
 
     def _tried(self, number: int, address: int, size: int) -> tuple[bytes, int]:
         self._packets.readTx(self._port, number, address, size)

@@ -128,7 +128,7 @@ class Finder:
         expected: ExpectedMoves,
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._expected = board, tracking, expected
-        self._settings, self._spools = (settings := rig.homing), (spools := spools_of(rig.actuator))
+        settings, spools = self._settings, self._spools = rig.homing, spools_of(rig.actuator)
         planes = names_of_planes(rig.planes, plane)
         self._judge_slack = partial(judge_slack, settings=rig, wrist=wrist, planes=planes)
         self._slack, self._pull, self._move = (

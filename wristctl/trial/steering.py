@@ -190,19 +190,19 @@ def _predict(known: Any, observer: Any, tick: int, reeled: Any, h: float) -> Non
     propagate(knowing, now, counts, h)
 
 
-class HostFaults:
+class HostFaults(Faults):
     """Faults of the bench that happen in the control loop; times count from the trial's motion."""
 
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
-        self._faults = Faults(faults)
-        self._faults.begin(0.0)
+        super().__init__(faults)
+        self.begin(0.0)
 
     def answer(self, answer: Any, time: float) -> Any:
         """The law's answer, in any planes; NaN under model-nan. Raises ArithmeticError under controller-exception."""
-        if self._faults.on("controller-exception", time):
+        if self.on("controller-exception", time):
             raise ArithmeticError("injected fault")
-        return answer._replace(torque_wanted=math.nan) if self._faults.on("model-nan", time) else answer
+        return answer._replace(torque_wanted=math.nan) if self.on("model-nan", time) else answer
 
     def disk(self, time: float) -> bool:
         """Whether the disk is full."""
-        return self._faults.on("disk-full", time)
+        return self.on("disk-full", time)

@@ -89,14 +89,8 @@ class Watch:
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
-        self._blind = BlindModel(
-            wrist,
-            settings.actuator,
-            settings.safety.softest,
-            self._period,
-            planes,
-            layout,
-        )
+        softest = settings.safety.softest
+        self._blind = BlindModel(wrist, settings.actuator, softest, self._period, planes, layout)
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
@@ -143,6 +137,7 @@ class Watch:
     def see(self, tick: Tick, last_usable: float) -> dict[str, float]:
         """All residuals of a tick; nan where one is not known yet."""
         self._began = tick.clock if self._began is None else self._began
+        since, one = tick.clock - self._began, len(self._cameras) == 1
         self._count(tick)
         finite = bool(np.isfinite(np.hstack(tick.estimate)).all())
         heard = tick.unheard < _UNHEARD * self._period  # else the wrist goes on, and nobody knows where spools stand
@@ -158,10 +153,10 @@ class Watch:
             "tension_ratio": self._tension_ratio(tick) if finite else math.nan,
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
-            "doubted": self._doubted(tick.clock),
+            "doubted": self._cameras[0].doubted(tick.clock, since) if one else math.nan,
             **self._following(tick),
-            **self._of_timing(tick.clock),
-            "unseen": max(self._unseen(camera, tick.clock) for camera in self._cameras),
+            **self._of_timing(tick.clock, since),
+            "unseen": max(each.unseen(tick.clock, since, self._settings.sensor) for each in self._cameras),
             "repeated": float(max(camera.repeated(tick.clock) for camera in self._cameras)),
             "resent": sum(self._resent.values(tick.clock)),
             "moved": max(camera.moved for camera in self._cameras),
@@ -232,19 +227,11 @@ class Watch:
         across = frames[0].away if len(frames) == 1 else math.nan
         return {"jump": _size(jumps), "across": across, "load": load, "apart": _size([each.apart for each in frames])}
 
-    def _of_timing(self, clock: float) -> dict[str, float]:
+    def _of_timing(self, clock: float, since: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))
-        if self._began is None or clock - self._began < _TICKS or not trips:
+        if since < _TICKS or not trips:
             return {"round_trip": math.nan, "skipped": math.nan}
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
-
-    def _doubted(self, clock: float) -> float:
-        since = clock - (clock if self._began is None else self._began)
-        return self._cameras[0].doubted(clock, since) if len(self._cameras) == 1 else math.nan
-
-    def _unseen(self, camera: CameraRecord, clock: float) -> float:
-        since = clock - (clock if self._began is None else self._began)
-        return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
         name = limit.name
