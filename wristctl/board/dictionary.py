@@ -177,14 +177,10 @@ def python_module(table: MessageTable) -> str:
     return "\n".join([*out, ""])
 
 
-def _enumeration(unit: str) -> str | None:
-    return unit if unit in CODES | BITS else None
-
-
 def _named_tuple(name: str, entry: MessageTable, defaults: MessageTable) -> list[str]:
     out = ["", "", f"class {name}(NamedTuple):", f'    """{entry["meaning"][0].upper()}{entry["meaning"][1:]}."""', ""]
     for field, (_kind, count, scale, unit, *span) in entry["fields"].items():
-        scalar = _enumeration(unit) or ("float" if scale > 1 else "int")
+        scalar = unit if unit in CODES | BITS else "float" if scale > 1 else "int"
         default = ""
         if field in defaults:
             value = defaults[field]["value"] / scale if scale > 1 else defaults[field]["value"]

@@ -175,12 +175,6 @@ class Finder:
         self._rest = self._rests()
         self._judge_slack(self._rest)
 
-    def bend_once(self, axis: int, about: int) -> None:
-        """Let an axis that bends the wrist at `about` bend it, and go again: friction inside then holds it there."""
-        self._reel(axis, about + self._pull)
-        self._bent(axis)
-        self._let_go(axis, -2 * self._pull)
-
     def line(self, axis: int, about: int) -> Line:
         """How the wrist bends by an axis that bends it at `about`. Lets go again.
 
@@ -226,7 +220,9 @@ class Finder:
         One that has no other is measured after the one that pulls against it most.
         """
         against = axes[-1] if len(axes) > 1 else self._expected.against(axes[0])
-        self.bend_once(against, about[against])
+        self._reel(against, about[against] + self._pull)
+        self._bent(against)
+        self._let_go(against, -2 * self._pull)  # friction inside holds it there
         return {axis: self.line(axis, about[axis]) for axis in axes}
 
     def lines(self, about: Sequence[int]) -> tuple[list[Line], Bend, list[float]]:
