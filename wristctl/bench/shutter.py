@@ -158,7 +158,6 @@ class Shutter:
         )  # fmt: skip
 
     def _shown(self, number: int, time: float) -> int:
-        """The frame whose picture this one shows."""
         shown = [number]
         for fault in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
             first = math.floor(self._faults.begun(fault) * self._settings.frame_rate - self._settings.phase)

@@ -73,7 +73,6 @@ class Cells(Protocol):
 
 
 def _status(content: tuple[Any, ...]) -> Status:
-    """The status that an answer begins with."""
     return Status(*content[: len(Status._fields)])
 
 
@@ -253,7 +252,6 @@ class Board(Exchange):
 
     @staticmethod
     def _packed(message: Command | tuple[Any, ...]) -> tuple[Command, bytes]:
-        """A message as command and payload."""
         if isinstance(message, Command):
             return message, b""
         return COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
@@ -263,7 +261,6 @@ class Board(Exchange):
         return self._connection.to_bytes(2, "little") + payload if command in BOUND else payload
 
     def _seen(self, command: Command, content: tuple[Any, ...]) -> Status:
-        """The status in an answer; load cells are shown theirs."""
         if self.cells is not None and ANSWER_TO[command] is Pulls:
             self.cells.take(Pulls(*content))
         return _status(content)

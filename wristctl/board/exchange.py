@@ -45,7 +45,6 @@ class _Sent(NamedTuple):
     """Answers that had come too late by then."""
 
     def is_answered_by(self, frame: WireFrame) -> bool:
-        """Whether a frame is the answer."""
         return (frame.code, frame.sequence) == (self.command | _ANSWER, self.sequence) and bool(frame.payload)
 
 

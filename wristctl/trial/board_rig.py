@@ -59,11 +59,9 @@ class _Clock:
         self._transport, self.virtual = transport, virtual
 
     def now(self) -> float:
-        """Seconds on it."""
         return self._transport.now()
 
     def wait_until(self, moment: float) -> None:
-        """Let time pass until then."""
         if (ahead := moment - self._transport.now()) > 0.0:
             self._transport.wait(ahead)
 

@@ -136,7 +136,6 @@ class GuardedRig:
             raise RigStop(what, raised_at(error) or self.where, "mend it there; --debug shows the traceback") from error
 
     def _values(self, name: str, values: Any, count: int, finite: bool = True) -> Array:
-        """Numbers of an answer (count,). Raises RigStop for others."""
         try:
             numbers = np.array(values, float)
         except (TypeError, ValueError):

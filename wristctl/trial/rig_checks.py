@@ -109,7 +109,6 @@ class RigTrier:
         return np.array(rows).reshape(len(rows), 1 + self._facts.planes)
 
     def _seen(self, seconds: float) -> Array:
-        """Median of the looks of so long [s] that are news (P,) [rad]."""
         news = self._news(seconds)
         if not len(news):
             raise Unfit(f"no look of {seconds:g} s is news: the bend is nan, or its time stands still")
@@ -204,7 +203,6 @@ class RigTrier:
         )
 
     def _rests(self) -> Array:
-        """Bend (P,) [rad] of a wrist that was let go, once it moves no more."""
         rest = rest_of(self._motors, self._tracking, self._expected, self._settings.homing)
         return np.array([rest.theta, rest.beside][: self._facts.planes])
 

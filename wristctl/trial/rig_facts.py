@@ -171,7 +171,6 @@ def _rest(seen: Sequence[Sequence[Sighting]], settings: HwRunSettings, wrist: Wr
 
 
 def _ids(settings: HwRunSettings) -> list[tuple[int, int]]:
-    """Ids of the markers that each of two cameras should see."""
     return [(markers.base, markers.tip) for markers in (settings.markers, settings.markers_2)]
 
 
@@ -226,7 +225,6 @@ def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Troubl
 
 
 def _of_the_views(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
-    """Cameras that show the other one's markers."""
     shown = [" and ".join(map(str, camera.foreign)) for camera in facts.cameras]
     if all(shown):
         problem = f"the cameras are exchanged: camera 1 shows markers {shown[0]}, camera 2 markers {shown[1]}"

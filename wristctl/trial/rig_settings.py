@@ -155,7 +155,6 @@ def settings_of(facts: Facts, settings: HwRunSettings, where: str) -> HwRunSetti
 
 
 def _missing(section: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that a section was not given."""
     return {name: each for name, each in values.items() if name not in section.model_fields_set}
 
 

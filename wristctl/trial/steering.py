@@ -12,7 +12,7 @@ from wristctl.config.bench import InjectedFault
 from wristctl.config.plant import Sensor
 from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
+from wristctl.control.response import OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.observer import knowing_in_lanes, propagate
@@ -31,11 +31,6 @@ class Answer(NamedTuple):
     torque: Array
     share: float
     tension: Array
-
-    @property
-    def saturated(self) -> bool:
-        """Whether the wanted torque is out of the tendons' reach."""
-        return not self.share >= FULL
 
 
 class _Observer(NamedTuple):

@@ -172,7 +172,6 @@ class Watch:
             raise self._stop(beyond, tick)
 
     def _pull(self, position: Array, taut: Array) -> float:
-        """Largest tension that spools make [N]."""
         return max(0.0, float(self._spools.tension(position, taut).max()))
 
     def _weighed(self, clock: float, position: Array, taut: Array) -> dict[str, float]:

@@ -59,7 +59,6 @@ def _greys(image: NDArray[Any], vertices: NDArray[np.complex128], along: Array, 
 
 
 def _meeting(point: NDArray[np.complex128], along: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Intersections of consecutive lines."""
     before, ahead = np.roll(point, 1), np.roll(along, 1)
     share = ((point - before).conj() * along).imag / (ahead.conj() * along).imag
     met: NDArray[np.complex128] = before + share * ahead
@@ -205,7 +204,6 @@ def quality_of(image: Image, corners: Array) -> PictureQuality:
 
 
 def _width(profile: Array) -> float:
-    """Standard deviation [px] of a rise, about its middle."""
     rise = np.diff(profile).clip(0.0)
     distance = _EDGE_FINE * np.arange(len(rise))
     total = rise.sum() + 1e-9

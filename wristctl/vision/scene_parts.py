@@ -135,7 +135,6 @@ def with_last_disc(points: Array, bend: float, length: float, disc: tuple[comple
 
 
 def _turned(theta: float, bend: float) -> Array:
-    """The rotation (3, 3) from the first disc to the last."""
     return np.asarray(cv2.Rodrigues(np.array([0.0, -bend, theta]))[0])
 
 
