@@ -15,9 +15,8 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_between
+from wristctl.trial.camera_record import CameraRecord, Frame, MarkerLag, Recent, jump_between
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
-from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
 from wristctl.trial.rig_belief import TOWARD, names_of_planes, numbers_of, pull_directions, unit_toward
 from wristctl.trial.rig_words import words_of_board, words_of_rig
