@@ -83,11 +83,14 @@ class Spools:
 
         They were at `place` when rates took effect in the last tick, of which the newest of `rates` (4, n) [1/s] are.
         """
-        return _where_spools_are(self.timing, place, rates, math.nan, period)
+        return self.reckoned(place, rates, math.nan, period)
 
     def reckoned(self, place: Array, rates: Array, time: float, period: float) -> Array:
         """Positions (4,) [steps] at a time [s] in this tick, of which the newest of `rates` are."""
-        return _where_spools_are(self.timing, place, rates, time, period)
+        places: Array = np.empty(len(place))
+        sent = (0,) * rates.shape[1]
+        _places(np.array(self.timing), place, np.ascontiguousarray(rates), sent, time, period, places)
+        return places
 
 
 def spools_of(actuator: Actuator) -> Spools:
@@ -156,12 +159,6 @@ def _followed(motor: Any, place: Any, targets: Any, sent: Any, period: float, en
         own = part(rows_of(targets[axis]), 0, sent)
         out[axis], _, summed = motor_at(follower, before[axis], own, period + zero_like(before[axis]), period)
         mean[axis] = summed / period
-
-
-def _where_spools_are(timing: Timing, place: Array, rates: Array, time: float, period: float) -> Array:
-    places: Array = np.empty(len(place))
-    _places(np.array(timing), place, np.ascontiguousarray(rates), (0,) * rates.shape[1], time, period, places)
-    return places
 
 
 @kernel
