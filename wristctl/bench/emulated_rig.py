@@ -33,15 +33,15 @@ def planes_seen(markers_2: Markers | None) -> tuple[Literal[0, 1] | None, ...]:
     return (None,) if markers_2 is None else (0, 1)
 
 
-class Eye:
+class Eye(Shutter):
     """A camera of the rig: when it takes which pictures, and what goes wrong with it."""
 
     def __init__(
         self, settings: RenderedCamera, faults: CameraFaults, wrist: BenchWrist, stream: Entropy,
         scene: Callable[[], Scene],
     ) -> None:  # fmt: skip
+        super().__init__(settings, faults, wrist, stream)
         self.faults, self._scene = faults, scene
-        self.shutter = Shutter(settings, faults, wrist, stream)
 
     @cached_property
     def scene(self) -> Scene:
@@ -109,7 +109,7 @@ class EmulatedRig:
         self.wrist.begin(disturbances or Disturbances(), start)
         if noise is not None:
             for number, eye in enumerate(self.eyes):
-                eye.shutter.begin(start, (*noise, number) if number else noise)
+                eye.begin(start, (*noise, number) if number else noise)
         self.faults.begin(start)
 
 

@@ -128,12 +128,12 @@ class VirtualCamera:
         self._rig.catch_up()
         if self._eye.faults.on("camera-lost", self._rig.wrist.time):
             raise CameraError("the camera gives no more pictures", self.name, "injected fault")
-        shutter = self._eye.shutter
-        newest = shutter.newest(shutter.delay)
+        eye = self._eye
+        newest = eye.newest(eye.delay)
         unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
-        for number in filter(shutter.arrives, unseen):
-            if shutter.has_arrived(number):
-                return picture(shutter.expose(number), self._eye.scene)
+        for number in filter(eye.arrives, unseen):
+            if eye.has_arrived(number):
+                return picture(eye.expose(number), eye.scene)
             self._seen = number - 1  # it is still on its way
         return None
 
