@@ -118,7 +118,7 @@ class Spoiled(VirtualCamera):
     """A bench's camera whose pictures are spoiled from a while after the motion has begun."""
 
     def __init__(self, bench: VirtualBench, number: int, spoil: Spoil) -> None:
-        super().__init__(bench._rig, number)
+        super().__init__(bench, number)
         self._bench, self._spoil = bench, spoil
 
     def newest(self) -> Frame | None:
