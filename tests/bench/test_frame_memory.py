@@ -12,7 +12,7 @@ from wristctl.vision.camera import Frame
 
 
 @pytest.fixture
-def sides(tmp_path: Path) -> tuple[FrameMemory]:
+def sides(tmp_path: Path) -> tuple[FrameMemory, FrameMemory]:
     writer = FrameMemory(tmp_path / "frame", (3, 5))
     return writer, FrameMemory(tmp_path / "frame")
 
@@ -21,7 +21,7 @@ def frame(number: int) -> Frame:
     return Frame(np.arange(15, dtype=np.uint8).reshape(3, 5) + np.uint8(number), 0.5 * number, number)
 
 
-def test_the_newest_frame_is_seen_whole_and_once(sides: tuple[FrameMemory]) -> None:
+def test_the_newest_frame_is_seen_whole_and_once(sides: tuple[FrameMemory, FrameMemory]) -> None:
     writer, camera = sides
     assert camera.newest() is None
     writer.write(frame(1))
@@ -47,7 +47,7 @@ def test_a_frame_that_is_being_written_is_not_seen(tmp_path: Path) -> None:
 
 
 def test_a_frame_that_changes_while_it_is_read_is_not_seen(
-    sides: tuple[FrameMemory], monkeypatch: pytest.MonkeyPatch
+    sides: tuple[FrameMemory, FrameMemory], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     writer, camera = sides
     writer.write(frame(1))

@@ -76,12 +76,12 @@ RESET_MEANING = _prose(Reset, "meaning")
 
 
 def _layout(entry: Mapping[str, Any]) -> Layout:
-    return Layout(
-        *(
-            Field(name, STRUCT_CODE[code], count, scale, unit, *(span or (None, None)), getattr(messages, unit, None))
-            for name, (code, count, scale, unit, *span) in entry["fields"].items()
-        )
-    )
+    fields = []
+    for name, (code, count, scale, unit, *span) in entry["fields"].items():
+        lowest, highest = span or (None, None)
+        kind = getattr(messages, unit, None)
+        fields.append(Field(name, STRUCT_CODE[code], count, scale, unit, lowest, highest, kind))
+    return Layout(*fields)
 
 
 _COMMANDS = {Command[name]: entry for name, entry in _TABLE["commands"].items()}
