@@ -47,6 +47,7 @@ class PseudoTerminal:
             while coming and coming[0][0] <= now:
                 self._line.send(coming.popleft()[1])
             wait = min(_WAIT, max(0.0, coming[0][0] - now)) if coming else _WAIT
-            if self._line.wait(wait) and (data := self._line.receive()):
+            self._line.wait(wait)
+            if data := self._line.receive():  # also the last of a client that has gone
                 with self.lock:
                     coming.extend(self._rehearsal.receive(data))
