@@ -154,7 +154,7 @@ class Watch:
             "disabled": float(tick.state != State.ENABLED),
             "doubted": self._cameras[0].doubted(tick.clock, since) if one else math.nan,
             **self._following(tick),
-            **self._of_timing(tick.clock, since),
+            **self._of_timing(tick.clock),
             "unseen": max(each.unseen(tick.clock, since, self._settings.sensor) for each in self._cameras),
             "repeated": float(max(camera.repeated(tick.clock) for camera in self._cameras)),
             "resent": sum(self._resent.values(tick.clock)),
@@ -225,9 +225,9 @@ class Watch:
         across = frames[0].away if len(frames) == 1 else math.nan
         return {"jump": _size(jumps), "across": across, "load": load, "apart": _size([each.apart for each in frames])}
 
-    def _of_timing(self, clock: float, since: float) -> dict[str, float]:
+    def _of_timing(self, clock: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))
-        if since < _TICKS or not trips:
+        if self._began is None or clock - self._began < _TICKS or not trips:
             return {"round_trip": math.nan, "skipped": math.nan}
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
 
