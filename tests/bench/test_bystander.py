@@ -22,7 +22,7 @@ def test_the_button_is_pressed_and_released_and_the_wrist_turned(caplog: pytest.
     assert not rig.chip.pin("G", 0), "half a word is none"
     os.write(keyboard, b"ss\nflexion\n")
     bystander.look()
-    assert rig.chip.pin("G", 0) and rig.wrist.plane == "flexion"
+    assert rig.chip.pin("G", 0) and rig.wrist._load.plane == "flexion"
     os.write(keyboard, b"dance\nrelease\n")
     bystander.look()
     assert not rig.chip.pin("G", 0) and "dance" in caplog.text and "press, release" in caplog.text

@@ -155,12 +155,12 @@ def test_the_angle_found_in_rendered_pictures_is_the_one_the_wrist_had(host_on: 
     settings = BenchSettings(motors=TAUT, camera=RenderedCamera(dropped=0.0))
     host = host_on(settings)
     tracker = Tracker(Markers(), Scene(settings.camera.scene, WRIST).view, Gates())
-    host.bench.camera.newest()
+    host.bench.cameras[0].newest()
     errors = []
     for _ in range(40):
         host.board.turn((-300.0, -300.0, 350.0, 350.0))
         host.bench.transport.wait(TICK)
-        if (frame := host.bench.camera.newest()) is not None:
+        if (frame := host.bench.cameras[0].newest()) is not None:
             sighting = tracker.see(frame)
             assert sighting.verdict == SightingVerdict.OK
             truth = host.bench.truth(frame.time - 1e-3)
@@ -179,7 +179,7 @@ def test_the_whole_bench_gives_the_same_bytes_in_every_run() -> None:
     for _ in range(2):
         bench = VirtualBench(BenchSettings(), WRIST, seed=5)
         bench.transport.wait(0.1)
-        frame = bench.camera.newest()
+        frame = bench.cameras[0].newest()
         assert frame is not None
         runs.append(frame.image.tobytes() + bench.truth().theta.tobytes())
     assert runs[0] == runs[1]

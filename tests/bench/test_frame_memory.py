@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.bench.frame_process import FrameMemory, SharedCamera
+from wristctl.bench.frame_process import FrameMemory
 from wristctl.vision.camera import Frame
 
 
 @pytest.fixture
-def sides(tmp_path: Path) -> tuple[FrameMemory, SharedCamera]:
+def sides(tmp_path: Path) -> tuple[FrameMemory, FrameMemory]:
     writer = FrameMemory(tmp_path / "frame", (3, 5))
-    return writer, SharedCamera(tmp_path / "frame")
+    return writer, FrameMemory(tmp_path / "frame")
 
 
 def frame(number: int) -> Frame:
     return Frame(np.arange(15, dtype=np.uint8).reshape(3, 5) + np.uint8(number), 0.5 * number, number)
 
 
-def test_the_newest_frame_is_seen_whole_and_once(sides: tuple[FrameMemory, SharedCamera]) -> None:
+def test_the_newest_frame_is_seen_whole_and_once(sides: tuple[FrameMemory, FrameMemory]) -> None:
     writer, camera = sides
     assert camera.newest() is None
     writer.write(frame(1))
@@ -37,7 +37,7 @@ def test_the_newest_frame_is_seen_whole_and_once(sides: tuple[FrameMemory, Share
 
 
 def test_a_frame_that_is_being_written_is_not_seen(tmp_path: Path) -> None:
-    writer, camera = FrameMemory(tmp_path / "frame", (3, 5)), SharedCamera(tmp_path / "frame")
+    writer, camera = FrameMemory(tmp_path / "frame", (3, 5)), FrameMemory(tmp_path / "frame")
     writer.write(frame(1))
     counts = np.memmap(tmp_path / "frame", np.int64, "r+", shape=(1,))
     counts += 1
@@ -47,7 +47,7 @@ def test_a_frame_that_is_being_written_is_not_seen(tmp_path: Path) -> None:
 
 
 def test_a_frame_that_changes_while_it_is_read_is_not_seen(
-    sides: tuple[FrameMemory, SharedCamera], monkeypatch: pytest.MonkeyPatch
+    sides: tuple[FrameMemory, FrameMemory], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     writer, camera = sides
     writer.write(frame(1))
@@ -66,4 +66,4 @@ def test_a_frame_that_changes_while_it_is_read_is_not_seen(
 
 def test_its_name_is_its_file(tmp_path: Path) -> None:
     FrameMemory(tmp_path / "frame", (3, 5))
-    assert SharedCamera(tmp_path / "frame").name == str(tmp_path / "frame")
+    assert FrameMemory(tmp_path / "frame").name == str(tmp_path / "frame")

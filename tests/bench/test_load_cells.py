@@ -123,7 +123,7 @@ def test_without_cells_all_are_silent(host_on: HostOn) -> None:
 
 def test_a_weight_that_a_bystander_hangs_on_a_cell_is_read(host_on: HostOn) -> None:
     host = host_on(settings())
-    rig = host.bench._rig
+    rig = host.bench
     before = newtons(newest(host))
     bystander = Bystander(rig, -1)
     bystander.do("hang 3 2.5")
@@ -135,6 +135,6 @@ def test_a_weight_that_a_bystander_hangs_on_a_cell_is_read(host_on: HostOn) -> N
 
 def test_a_status_costs_the_line_half_a_millisecond_more_with_the_pulls(host_on: HostOn) -> None:
     board = host_on(settings()).board
-    plain = board._exchange.ask(Command.STATUS, b"", 0.1, 1)
-    weighed = board._exchange.ask(Command.PULLS, b"", 0.1, 1)
+    plain = board.ask(Command.STATUS, b"", 0.1, 1)
+    weighed = board.ask(Command.PULLS, b"", 0.1, 1)
     assert len(weighed) - len(plain) == 12

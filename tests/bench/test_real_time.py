@@ -24,7 +24,7 @@ from tests.bench.record import is_released, last_step, read
 from tests.board.patience import WATCHDOG, patient, wait_for
 from wristctl.bench.emulated_rig import EmulatedRig
 from wristctl.bench.faults import Faults
-from wristctl.bench.frame_process import FrameMemory, SharedCamera
+from wristctl.bench.frame_process import FrameMemory
 from wristctl.bench.real_time_bench import RealTimeBench, films_of
 from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
@@ -118,7 +118,7 @@ def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving, m
     time.sleep(0.5)
     settled = time.monotonic()
 
-    def newer(camera: SharedCamera) -> Frame | None:
+    def newer(camera: FrameMemory) -> Frame | None:
         frame = camera.newest()
         return frame if frame is not None and frame.time > settled else None
 

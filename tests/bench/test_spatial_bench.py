@@ -332,7 +332,7 @@ def off_the_truth(host: Host, move: Callable[[tuple[int, int, int, int]], object
     """By how much each camera's angles are off the true bend of its plane [rad], so long from two moves on."""
     trackers = [
         Tracker(markers, eye.scene.view, Gates(), plane=plane)  # type: ignore[arg-type]
-        for plane, (markers, eye) in enumerate(zip((Markers(), SECOND), host.bench._rig.eyes, strict=True))
+        for plane, (markers, eye) in enumerate(zip((Markers(), SECOND), host.bench.eyes, strict=True))
     ]
     off: list[list[float]] = [[], []]
     for steps in ((-300, -100, -80, 500), (300, -600, 900, -100)):
@@ -379,7 +379,7 @@ def test_a_fault_of_one_camera_leaves_the_other_as_it_is(camera: Literal[1, 2]) 
     kinds = Counter(
         tracker.see(frame).verdict.value
         for plane, frames in enumerate(looked(covered, 0.2))
-        for tracker in [Tracker((Markers(), SECOND)[plane], Scene(covered.bench._rig.settings.camera.scene, WRIST).view,
+        for tracker in [Tracker((Markers(), SECOND)[plane], Scene(covered.bench.settings.camera.scene, WRIST).view,
                                 Gates(), plane=plane)]  # type: ignore[arg-type]
         for _, frame in frames
     )  # fmt: skip

@@ -8,13 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from tests.board.drive_watch import CLOCK, DriveWatch
+from wristctl.board.layout import ANSWER_TO, BOUND, COMMAND_OF, LAYOUTS
 from wristctl.board.messages import (
-    ANSWER_TO,
     BAUD,
-    BOUND,
-    COMMAND_OF,
     ENABLE_KEY,
-    LAYOUTS,
     Command,
     Configure,
     Connect,

@@ -16,7 +16,8 @@ from wristctl.board.board_errors import (
     Restarted,
     WrongFirmware,
 )
-from wristctl.board.messages import FAULT_MEANING, Command, Fault, Result
+from wristctl.board.layout import FAULT_MEANING
+from wristctl.board.messages import Command, Fault, Result
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ import pytest
 
 from wristctl.board import messages
 from wristctl.board.dictionary import PROSE, c_header, dictionary_hash, load, python_module
-from wristctl.board.messages import ANSWER_TO, COMMAND_OF, LAYOUTS, Command, Configure, Rate, Status
+from wristctl.board.layout import ANSWER_TO, COMMAND_OF, LAYOUTS
+from wristctl.board.messages import Command, Configure, Rate, Status
 
 TABLE = load()
 

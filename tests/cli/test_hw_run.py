@@ -18,7 +18,8 @@ import pytest
 from tests.cli.conftest import Call
 from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.board.framing import Decoder
-from wristctl.board.messages import LAYOUTS, Command, Rate
+from wristctl.board.layout import LAYOUTS
+from wristctl.board.messages import Command, Rate
 from wristctl.commands.loop_warnings import outside_conditions
 from wristctl.config.camera import Gates, Markers
 from wristctl.records import Run, list_runs, open_run

@@ -347,6 +347,16 @@ def test_facts_that_cannot_be_are_named(changes: dict[str, Any], words: str) -> 
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize(("lever", "alike"), [(0.02001, True), (0.01999, True), (0.0201, False)])
+def test_levers_of_one_plane_may_differ_by_less_than_a_thousandth(lever: float, alike: bool) -> None:
+    facts = _facts(planes=1, tendons=[Tendon(0.0, 0.02), Tendon(180.0, lever)])
+    if alike:
+        assert check_facts(facts, "a.py:RIG") is facts
+        return
+    with pytest.raises(UserError, match="with one lever"):
+        check_facts(facts, "a.py:RIG")
+
+
 class _Still:
     """A rig that answers, and does nothing."""
 

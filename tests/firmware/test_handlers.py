@@ -14,7 +14,8 @@ import pytest
 from tests.board.bench import Bench, encode
 from wristctl.board.dictionary import TABLE, c_header, load
 from wristctl.board.emulator import Atmega2560
-from wristctl.board.messages import LAYOUTS, Command, Rate, Result, Status
+from wristctl.board.layout import LAYOUTS
+from wristctl.board.messages import Command, Rate, Result, Status
 
 BOARD = TABLE.parent
 CONTRIBUTING = BOARD.parents[1] / "CONTRIBUTING.md"

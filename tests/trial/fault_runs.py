@@ -118,7 +118,7 @@ def perform(
         log.close()
     stopped = bench.transport.now()
     bench.transport.wait(0.3)
-    truth, start = bench.truth(), bench._rig.faults._starts["first trial"]
+    truth, start = bench.truth(), bench.faults._starts["first trial"]
     told = np.array(rows).reshape(-1, 4)
     tried = told[told[:, 0] >= 0]
     error = float(np.abs(np.interp(tried[:, 1], truth.time, truth.angle) - tried[:, 2]).max(initial=0.0))
@@ -152,7 +152,7 @@ def injecting(faults: Sequence[Mapping[str, Any]]) -> Prepared:
     injected = tuple(InjectedFault.model_validate(each) for each in faults)
 
     def change(bench: VirtualBench) -> None:
-        bench._rig.faults._faults = injected
+        bench.faults._faults = injected
 
     return change
 
@@ -182,7 +182,7 @@ def forked(
             raise _EndedByForks
 
         def prepared(bench: VirtualBench) -> None:
-            transport, done, starts = bench.transport, [False], bench._rig.faults._starts
+            transport, done, starts = bench.transport, [False], bench.faults._starts
             go_on = transport._run
 
             def watched(end: int) -> None:

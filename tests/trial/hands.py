@@ -45,7 +45,7 @@ def edge(further: float, stiffness: float) -> Grip:
 
 def lay_hand_on(bench: VirtualBench, grip: Grip, since: float, duration: float = math.inf) -> None:
     """Let this act from so long after the first trial began [s], in trials that nobody pushes."""
-    load, starts = bench._rig.wrist._load, bench._rig.faults._starts
+    load, starts = bench.wrist._load, bench.faults._starts
     follow, n = load.follow, load.coordinates
 
     def held(

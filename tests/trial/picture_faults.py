@@ -118,14 +118,14 @@ class Spoiled(VirtualCamera):
     """A bench's camera whose pictures are spoiled from a while after the motion has begun."""
 
     def __init__(self, bench: VirtualBench, number: int, spoil: Spoil) -> None:
-        super().__init__(bench._rig, number)
+        super().__init__(bench, number)
         self._bench, self._spoil = bench, spoil
 
     def newest(self) -> Frame | None:
         frame = super().newest()
         if frame is None:
             return None
-        time = frame.time - self._bench._rig.faults._starts["first trial"] - AT
+        time = frame.time - self._bench.faults._starts["first trial"] - AT
         return frame if time < 0.0 else frame._replace(image=self._spoil(frame.image, time))
 
 

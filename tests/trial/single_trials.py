@@ -62,7 +62,7 @@ def performed(
     finally:
         log.close()
     stopped = bench.transport.now()
-    begun = min(stopped, bench._rig.faults._starts["first trial"])
+    begun = min(stopped, bench.faults._starts["first trial"])
     truth, followed = bench.truth(begun), next(iter(done.motions.values()))
     time = truth.time - begun
     moving = time < followed.horizon if done.stop is None or done.stop.time is None else time < done.stop.time

@@ -46,7 +46,7 @@ class _Clock:
 def test_a_look_has_both_bends_of_its_time_and_is_news_once_a_frame() -> None:
     clock = _Clock()
     testbed: Any = SimpleNamespace(transport=clock, tracking=lambda: clock)
-    rig = BoardRig(testbed, HwRunSettings(planes=2), WristParameters(), virtual=True)
+    rig = BoardRig(testbed, HwRunSettings(planes=2), WristParameters())
     rig._tracking = cast("Any", clock)
     times = list[float]()
     for tick in range(200):

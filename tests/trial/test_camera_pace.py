@@ -31,7 +31,7 @@ def test_rate_latency_and_evenness_are_those_of_the_pictures(rate: float, latenc
     even = pace(rate, latency)
     assert even.rate == pytest.approx(rate) and even.latency == pytest.approx(latency, abs=1e-9)
     assert even.jitter == pytest.approx(0.0, abs=1e-9)
-    assert even.oldest == pytest.approx(latency + 2.0 / rate)
+    assert even.oldest() == pytest.approx(latency + 2.0 / rate)
     assert pace(rate, latency, 61, jitter=2e-3).jitter == pytest.approx(1.4826 * 4e-3, rel=0.05)
 
 

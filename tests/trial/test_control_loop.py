@@ -19,7 +19,7 @@ from wristctl.control.table import controller
 from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import at_rest, back
+from wristctl.trial.motions import back
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.steering import Answer, Steering
 from wristctl.trial.tick_timing import TickTiming
@@ -79,7 +79,7 @@ def rig_of(tmp_path: Path) -> Iterator[RigOf]:
 def test_ticks_come_at_the_period_on_the_clock(rig_of: RigOf) -> None:
     rig = rig_of()
     assert rig.loop.next_tick == 100.0
-    rig.follow(at_rest(0.2, PERIOD))
+    rig.follow(back(0.0, 0.2, 0.0, PERIOD))
     assert [row["clock"] for row in rig.rows] == pytest.approx(100.0 + PERIOD * np.arange(40))
     assert [row["time"] for row in rig.rows] == pytest.approx(PERIOD * np.arange(40))
     assert rig.loop.next_tick == pytest.approx(100.2 + PERIOD) and rig.timing.overruns == 0
@@ -100,7 +100,7 @@ def test_behind_a_motion_ticks_go_on_without_a_rate_until_the_board_says_that_no
         return turn(rates, life)
 
     rig.board.post_turn = ramps_down
-    rig.follow(at_rest(0.1, PERIOD), trial=3)
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD), trial=3)
     assert [what[1] for what in rig.board.told[-9:]] == [(0.0,) * 4] * 9 != [what[1] for what in rig.board.told[-10:-1]]
     assert [row["trial"] for row in rig.at_rest] == [-1] * 9, "they belong to no trial"
     assert [row["clock"] for row in rig.at_rest] == pytest.approx(100.1 + PERIOD * np.arange(9))
@@ -113,7 +113,7 @@ def test_motors_that_do_not_come_to_rest_are_a_reason_to_stop(rig_of: RigOf) -> 
     rig = rig_of()
     rig.board.flags = Flag.MOVING
     with pytest.raises(SafetyStop, match=r"the motors do not stand 0\.5 s after a motion"):
-        rig.follow(at_rest(0.1, PERIOD))
+        rig.follow(back(0.0, 0.1, 0.0, PERIOD))
     assert len(rig.at_rest) == pytest.approx(0.5 / PERIOD, abs=2)
 
 
@@ -122,13 +122,13 @@ def test_limits_hold_behind_a_motion_too(rig_of: RigOf) -> None:
     rig.board.flags = Flag.MOVING
     rig.marker._angle = lambda: 0.0 if len(rig.at_rest) < 10 else math.nan
     with pytest.raises(SafetyStop, match="no usable marker angle"):
-        rig.follow(at_rest(0.1, PERIOD))
+        rig.follow(back(0.0, 0.1, 0.0, PERIOD))
 
 
 def test_a_second_motion_counts_its_own_time(rig_of: RigOf) -> None:
     rig = rig_of()
-    rig.follow(at_rest(0.1, PERIOD))
-    rig.follow(at_rest(0.1, PERIOD), trial=0)
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD))
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD), trial=0)
     assert rig.rows[20]["time"] == pytest.approx(0.0) and rig.rows[20]["clock"] == pytest.approx(100.1 + PERIOD)
 
 
@@ -160,13 +160,13 @@ def test_a_tick_that_is_too_late_is_a_reason_to_stop(rig_of: RigOf) -> None:
 
     rig.board.post_turn = hangs
     with pytest.raises(SafetyStop, match="a tick came 24 ms late"):
-        rig.follow(at_rest(0.2, PERIOD))
+        rig.follow(back(0.0, 0.2, 0.0, PERIOD))
 
 
 def test_step_rates_live_for_two_and_a_half_periods_and_lapsed_ones_are_counted(rig_of: RigOf) -> None:
     for period, life in ((5e-3, 0.05), (0.02, 0.05), (0.03, 0.075)):
         rig = rig_of(control_period=period, safety={"late": 0.01}, sensor={"level": "camera", "frame_rate": 20.0})
-        rig.follow(at_rest(2 * PERIOD, PERIOD))
+        rig.follow(back(0.0, 2 * PERIOD, 0.0, PERIOD))
         assert set(rig.board.lives) == {life}
     turn = rig.board.post_turn
 
@@ -176,7 +176,7 @@ def test_step_rates_live_for_two_and_a_half_periods_and_lapsed_ones_are_counted(
 
     rig.board.post_turn = lapsing
     with pytest.raises(SafetyStop, match="step rates came too late"):
-        rig.follow(at_rest(0.5, PERIOD))
+        rig.follow(back(0.0, 0.5, 0.0, PERIOD))
     assert len(rig.rows) == 13
 
 
@@ -208,10 +208,10 @@ def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf)
     angles = iter([0.01, math.nan, 0.02] + [0.0] * 40)
     rig = rig_of(lambda: next(angles))
     rig.marker.delay = 0.002
-    rig.follow(at_rest(0.1, PERIOD))
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD))
     rig.rows.clear()
     angles = iter([0.01, math.nan, 0.02] + [0.0] * 40)
-    rig.follow(at_rest(0.05, PERIOD), trial=0)
+    rig.follow(back(0.0, 0.05, 0.0, PERIOD), trial=0)
     first, second, third = rig.rows[:3]
     assert (first["theta_measured"], first["verdict"]) == (0.01, "ok")
     assert first["captured"] == pytest.approx(-0.002)
@@ -226,12 +226,12 @@ def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf)
 def test_no_usable_angle_for_too_long_is_a_reason_to_stop_with_the_newest_verdict(rig_of: RigOf) -> None:
     rig = rig_of(lambda: math.nan, safety={"stale": 0.152})
     with pytest.raises(SafetyStop, match=r"no usable marker angle for 155 ms \(newest frame: no tip\)"):
-        rig.follow(at_rest(0.5, PERIOD))
+        rig.follow(back(0.0, 0.5, 0.0, PERIOD))
     assert len(rig.rows) == 31
     blind: Any = rig_of()
     blind.marker.look = list  # it sees nothing
     with pytest.raises(SafetyStop, match="no picture has come"):
-        blind.follow(at_rest(0.5, PERIOD))
+        blind.follow(back(0.0, 0.5, 0.0, PERIOD))
 
 
 def let_rates_move_axes(rig: Any) -> None:
@@ -252,7 +252,7 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
     """Each tendon holds its pretension: taut, and stretched by it."""
     rig = rig_of(signs=signs)
     let_rates_move_axes(rig)
-    rig.follow(at_rest(0.5, PERIOD))
+    rig.follow(back(0.0, 0.5, 0.0, PERIOD))
     actuator, last = SETTINGS.actuator, rig.rows[-1]
     steps = WRIST.pretension / actuator.tendon_stiffness / actuator.step_length
     for k, tendon in enumerate((1, 2, 4, 5)):
@@ -266,7 +266,7 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
 
 def test_positions_are_of_when_the_board_read_the_command_behind_half_a_usb_frame(rig_of: RigOf) -> None:
     rig = rig_of()
-    rig.follow(at_rest(0.1, PERIOD))
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD))
     after = np.array([row["counted"] - before["time"] for before, row in pairwise(rig.rows)]) - UNDERWAY
     sent = [sum(abs(row[f"sent_{tendon}"]) for tendon in (1, 2, 4, 5)) for row in rig.rows[:-1]]
     assert after[0] == pytest.approx(0.0, abs=1e-9) and np.abs(after).max() < 1e-4
@@ -293,7 +293,7 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
     rig = rig_of()
     let_rates_move_axes(rig)
     rig.board.lost = lost
-    rig.follow(at_rest(0.1, PERIOD))
+    rig.follow(back(0.0, 0.1, 0.0, PERIOD))
     wait = 0.5 * SETTINGS.actuator.update
     went_on = 1.5 * PERIOD - UNDERWAY - wait
     rows = rig.rows + rig.at_rest
@@ -309,21 +309,21 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
 
 def test_the_boards_state_and_all_its_faults_are_logged_by_name(rig_of: RigOf) -> None:
     rig = rig_of()
-    rig.follow(at_rest(0.02, PERIOD))
+    rig.follow(back(0.0, 0.02, 0.0, PERIOD))
     assert (rig.rows[-1]["state"], rig.rows[-1]["faults"]) == ("ENABLED", "")
     rig.board.faults = Fault.ESTOP_INPUT | Fault.LINK
-    rig.follow(at_rest(0.02, PERIOD))
+    rig.follow(back(0.0, 0.02, 0.0, PERIOD))
     assert rig.rows[-1]["faults"] == "LINK+ESTOP_INPUT"
     rig.board.state = State.FAULT
     with pytest.raises(SafetyStop, match="the board is FAULT"):
-        rig.follow(at_rest(0.02, PERIOD))
+        rig.follow(back(0.0, 0.02, 0.0, PERIOD))
 
 
 def test_a_law_that_raises_stops_as_such(rig_of: RigOf) -> None:
     rig = rig_of()
     rig.loop._steering.respond = lambda *_: 1 / 0
     with pytest.raises(SafetyStop, match="the controller failed: ZeroDivisionError"):
-        rig.follow(at_rest(0.02, PERIOD))
+        rig.follow(back(0.0, 0.02, 0.0, PERIOD))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -334,12 +334,12 @@ def test_what_a_law_wants_is_never_sent_where_it_is_no_number(rig_of: RigOf, nam
     answer = sound._replace(**{name: value * np.ones_like(getattr(sound, name))})
     rig.loop._steering.respond = lambda *_: answer
     with pytest.raises(SafetyStop, match="torque is not a number"):
-        rig.follow(at_rest(0.02, PERIOD))
+        rig.follow(back(0.0, 0.02, 0.0, PERIOD))
     assert not any(any(what[1]) for what in rig.board.told if what[0] == "turn")
 
 
 def test_verdicts_are_told_as_they_are(rig_of: RigOf) -> None:
     rig = rig_of()
     rig.marker._verdict = SightingVerdict.JUMP
-    rig.follow(at_rest(0.02, PERIOD))
+    rig.follow(back(0.0, 0.02, 0.0, PERIOD))
     assert {row["verdict"] for row in rig.rows} == {"jump"}

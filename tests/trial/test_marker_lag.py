@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.simulation.references import minimum_jerk
-from wristctl.trial.camera_record import CameraRecord
-from wristctl.trial.marker_lag import MarkerLag
+from wristctl.trial.camera_record import CameraRecord, MarkerLag
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 RATE, NOISE = 60.0, 1e-3

@@ -30,7 +30,7 @@ def test_a_reading_is_the_median_of_as_many_usable_frames_as_asked_for() -> None
     board: Any = RigBoard()
     angles = iter([9.0, 0.1, math.nan, 0.5, 0.2, 7.0, 7.0])
     tracking: Any = Marker(board, lambda: next(angles))
-    assert Patience(board).angle(tracking, 3) == 0.2, "what was seen before does not count"
+    assert Patience(board).reading(tracking, 3).theta == 0.2, "what was seen before does not count"
     assert next(angles) == 7.0
 
 
@@ -39,14 +39,14 @@ def test_frames_taken_before_the_reading_began_do_not_count() -> None:
     angles = iter([0.0, 1.0, 2.0, 3.0, 4.0])
     tracking: Any = Marker(board, lambda: next(angles))
     tracking.delay = 0.03  # at 20 ms between looks: the first comes from before
-    assert Patience(board).angle(tracking, 1) == 2.0
+    assert Patience(board).reading(tracking, 1).theta == 2.0
 
 
 def test_a_marker_that_cannot_be_read_for_two_seconds_is_said_with_why() -> None:
     board: Any = RigBoard()
     tracking: Any = Marker(board, lambda: math.nan)
     with pytest.raises(SafetyStop, match=r"could not be read \(newest frame: no tip\)"):
-        Patience(board).angle(tracking, 1)
+        Patience(board).reading(tracking, 1)
     assert 2.0 < board.transport.now() - 100.0 < 2.1
 
 

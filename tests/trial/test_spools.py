@@ -74,10 +74,6 @@ def test_spools_cannot_be_changed_once_they_are_made() -> None:
         SPOOLS.speed = 1.0  # type: ignore[misc]
 
 
-def test_torque_at_the_pulley_is_tension_times_radius() -> None:
-    assert SPOOLS.torque(np.array([60.0])) == pytest.approx([0.45])
-
-
 @settings(deadline=None)
 @given(st.floats(-2000.0, 2000.0), st.floats(-3000.0, 3000.0))
 def test_a_spool_reaches_a_moving_target_without_exceeding_speed_or_acceleration(gap: float, moving: float) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
+from wristctl.control.response import FULL
 from wristctl.control.table import controller, gains_of
 from wristctl.trial.rig_belief import RigBelief
 from wristctl.trial.steering import REMEMBERED, Answer, Steering
@@ -116,7 +117,7 @@ def test_feedforward_asks_for_the_torque_that_holds_the_reference() -> None:
     mirrored = steering().respond(still(-0.1))
     assert answer.torque_wanted == pytest.approx(-mirrored.torque_wanted) and answer.torque_wanted > 0.0
     assert sides(answer) == pytest.approx(sides(mirrored)[::-1])
-    assert answer.torque == pytest.approx(answer.torque_wanted) and not answer.saturated
+    assert answer.torque == pytest.approx(answer.torque_wanted) and answer.share >= FULL
     assert answer.torque == pytest.approx(2.0 * WRIST.tendon_offset * np.subtract(*sides(answer)), rel=1e-3)
     assert answer.tension.min() >= WRIST.pretension - 1e-9
 
@@ -130,7 +131,7 @@ def test_at_rest_each_tendon_keeps_its_pretension() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_torque_out_of_reach_is_cut_at_the_limits_and_said(sign: float) -> None:
     answer = steering().respond(still(sign * 10.0))
-    assert answer.saturated and abs(answer.torque) < abs(answer.torque_wanted)
+    assert answer.share < FULL and abs(answer.torque) < abs(answer.torque_wanted)
     pulled, slack = sides(answer)[:: int(sign)]
     assert pulled == pytest.approx(WRIST.tension_limit) and slack == pytest.approx(WRIST.pretension)
 

@@ -11,7 +11,7 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.loop import Reference
 from wristctl.errors import UserError
 from wristctl.simulation.reference import ReferenceKind
-from wristctl.trial.motions import at_rest, back, motion_of
+from wristctl.trial.motions import back, motion_of
 
 PERIOD = 5e-3
 
@@ -34,7 +34,7 @@ def test_its_rate_and_acceleration_are_its_derivatives() -> None:
 
 
 def test_at_rest_it_stays_straight() -> None:
-    way = at_rest(0.25, PERIOD)
+    way = back(0.0, 0.25, 0.0, PERIOD)
     assert len(way.time) == 50
     assert not np.any([way.theta_ref, way.rate_ref, way.acceleration_ref])
 

@@ -126,8 +126,8 @@ def test_a_marker_that_a_hand_has_covered_is_no_evidence(experiment: Run, monkey
 
 
 FAULTS: dict[str, tuple[Happens, type[UserError], str]] = {
-    "button": (lambda bench, time: bench._rig.chip.drive("G", 0, True), Faulted, "emergency stop button"),
-    "reset": (lambda bench, time: bench._rig.chip.reset(), Restarted, "the board has restarted"),
+    "button": (lambda bench, time: bench.chip.drive("G", 0, True), Faulted, "emergency stop button"),
+    "reset": (lambda bench, time: bench.chip.reset(), Restarted, "the board has restarted"),
     "port lost": (lambda bench, time: setattr(bench.transport, "_lost", True), PortLost, "the port is gone"),
     "stop": (lambda bench, time: bench.transport.chip.write(ESTOP), Faulted, "the host sent an emergency stop"),
     "released": (lambda bench, time: bench.transport.chip.write(DISABLE), SafetyStop, "the board is"),
@@ -151,7 +151,7 @@ def test_a_fault_ends_the_wait_within_a_tenth_of_a_second(
     done = two_planes(experiment)
     assert isinstance(done.error, error) and said in done.error.what
     assert 0.0 <= waited.seconds - at[0] <= 0.1
-    done.bench._rig.chip.run(FREQUENCY)
+    done.bench.chip.run(FREQUENCY)
     assert not any(done.bench.motion().energised)
     assert done.experiment.stop is not None and done.experiment.stop.reason == done.error.what
 

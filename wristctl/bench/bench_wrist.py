@@ -91,11 +91,6 @@ class BenchWrist:
         last = tuple(None if cycle < 0 else float(cycle) / FREQUENCY for cycle in spools.stepped)
         return MotorMotion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
 
-    @property
-    def plane(self) -> str | None:
-        """Name of +y in the plane that it bends in; None: it bends in two."""
-        return self._load.plane
-
     def face(self, direction: str) -> None:
         """Bend in this direction's plane from here on; where that is another plane, at rest at first as it is bent.
 

@@ -5,7 +5,8 @@ import os
 import re
 import select
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from wristctl.bench.load_cells import LoadCells
 from wristctl.bench.shutter import Shutter
 from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.board.emulator.chip import NEVER
-from wristctl.config.bench import BenchSettings
+from wristctl.config.bench import BenchSettings, RenderedCamera
 from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
@@ -27,16 +28,20 @@ from wristctl.wrist.directions import DIRECTIONS
 log = logging.getLogger(__name__)
 
 
-class Eye:
+def planes_seen(markers_2: Markers | None) -> tuple[Literal[0, 1] | None, ...]:
+    """Planes that a bench's cameras look at: with a second camera's markers 0 and 1, else None, the one that bends."""
+    return (None,) if markers_2 is None else (0, 1)
+
+
+class Eye(Shutter):
     """A camera of the rig: when it takes which pictures, and what goes wrong with it."""
 
     def __init__(
-        self, settings: BenchSettings, wrist: BenchWrist, faults: Faults, stream: Entropy, scene: Callable[[], Scene],
-        second: bool = False,
+        self, settings: RenderedCamera, faults: CameraFaults, wrist: BenchWrist, stream: Entropy,
+        scene: Callable[[], Scene],
     ) -> None:  # fmt: skip
-        self.faults = CameraFaults(faults, 2 if second else 1)
-        self.shutter = Shutter(settings.camera_2 if second else settings.camera, self.faults, wrist, stream)
-        self._scene = scene
+        super().__init__(settings, faults, wrist, stream)
+        self.faults, self._scene = faults, scene
 
     @cached_property
     def scene(self) -> Scene:
@@ -53,31 +58,22 @@ class EmulatedRig:
     """
 
     def __init__(
-        self,
-        settings: BenchSettings,
-        wrist: WristParameters,
-        seed: int,
-        markers: Markers | None = None,
-        chip: Atmega2560 | None = None,
-        markers_2: Markers | None = None,
-    ) -> None:
+        self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None,
+        chip: Atmega2560 | None = None, markers_2: Markers | None = None,
+    ) -> None:  # fmt: skip
         self.settings = settings
         self.chip = chip or Atmega2560()
         self.faults = Faults(settings.faults)
         positive, plant = (markers or Markers()).positive, stream(seed, "bench plant")
         self.wrist = BenchWrist(settings, wrist, plant, self.faults, positive, 1 if markers_2 is None else 2)
-        model, camera, camera_2 = settings.plant.model, settings.camera.scene, settings.camera_2.scene
-        drawn = stream(seed, "bench camera")
-        self.eyes: tuple[Eye, ...]
-        if markers_2 is None:
-            self.eyes = (Eye(settings, self.wrist, self.faults, drawn, lambda: Scene(camera, wrist, markers, model)),)
-        else:
-            first = Eye(settings, self.wrist, self.faults, drawn, lambda: Scene(camera, wrist, markers, model, plane=0))
-            second = Eye(
-                settings, self.wrist, self.faults, stream(seed, "bench camera 2"),
-                lambda: Scene(camera_2, wrist, markers_2, model, plane=1), second=True,
-            )  # fmt: skip
-            self.eyes = first, second
+        eyes = [(markers, settings.camera, "bench camera"), (markers_2, settings.camera_2, "bench camera 2")]
+        self.eyes = tuple(
+            Eye(
+                camera, CameraFaults(self.faults, number), self.wrist, stream(seed, name),
+                partial(Scene, camera.scene, wrist, seen, settings.plant.model, plane),
+            )
+            for number, (plane, (seen, camera, name)) in enumerate(zip(planes_seen(markers_2), eyes, strict=False), 1)
+        )  # fmt: skip
         cells = settings.load_cells
         self.cells = (
             None if cells is None else LoadCells(cells, self.chip, self.faults, stream(seed, "bench load cells"))
@@ -113,7 +109,7 @@ class EmulatedRig:
         self.wrist.begin(disturbances or Disturbances(), start)
         if noise is not None:
             for number, eye in enumerate(self.eyes):
-                eye.shutter.begin(start, (*noise, number) if number else noise)
+                eye.begin(start, (*noise, number) if number else noise)
         self.faults.begin(start)
 
 

@@ -29,9 +29,13 @@ _HEAD = np.dtype([*((name, np.int64) for name in ("writes", "number", "height", 
 
 
 class FrameMemory:
-    """The frame in this file. One process writes; the file's maker gives the size of the pictures."""
+    """The frame in this file, as a camera. One process writes; the file's maker gives the size of the pictures.
+
+    Times are of `time.monotonic`, which processes share.
+    """
 
     def __init__(self, path: Path, size: tuple[int, int] | None = None) -> None:
+        self.name = str(path)
         if size is not None:
             head = np.zeros(1, _HEAD)
             head["height"], head["width"] = size
@@ -60,18 +64,6 @@ class FrameMemory:
             return None
         self._seen = writes
         return frame
-
-
-class SharedCamera:
-    """The client's side of a camera in another process; times are of `time.monotonic`, which processes share."""
-
-    def __init__(self, path: Path) -> None:
-        self.name = str(path)
-        self._memory = FrameMemory(path)
-
-    def newest(self) -> Frame | None:
-        """The newest frame that has arrived since the last call, None if none has."""
-        return self._memory.newest()
 
     def close(self) -> None:
         """Nothing to give back: the memory goes with its file."""

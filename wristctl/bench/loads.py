@@ -125,7 +125,6 @@ class SpatialLoad(Load):
         self._weigh()
 
     def _weigh(self) -> WristParameters:
-        """As `Load._weigh`, with the tendons that are wound."""
         plant = _wound(plant_of(self._wrist, self._laden()))
         self._hanging = self._hanging._replace(values=self._model.values(plant, self._segments))
         return plant
@@ -179,7 +178,6 @@ class PlanarLoad(Load):
         self._hanging = self._hanging._replace(axes=axes, tendons=tendons._replace(state=state, inner=inner))
 
     def _weigh(self) -> WristParameters:
-        """As `Load._weigh`, in the plane that it faces and across it."""
         plane = self.plane or "ulnar"
         other = "flexion" if plane == "ulnar" else "ulnar"
         own, beside = (plant_of(*facing(self._wrist, self._laden(), seen)) for seen in (plane, other))

@@ -4,15 +4,17 @@ import multiprocessing
 import shutil
 import signal
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from wristctl.bench.bench_wrist import MotorMotion, Truth
-from wristctl.bench.frame_process import SharedCamera, start_film
+from wristctl.bench.emulated_rig import EmulatedRig, planes_seen
+from wristctl.bench.frame_process import FrameMemory, start_film
 from wristctl.board.board_errors import BoardError
 from wristctl.board.messages import BAUD
 from wristctl.board.transport import SerialTransport
@@ -39,7 +41,7 @@ class RealTimeBench:
     ) -> None:
         self._processes, self._control = processes, control
         self.transport = SerialTransport(address, BAUD, emulated=True)
-        self.cameras = tuple(map(SharedCamera, pictures))
+        self.cameras = tuple(map(FrameMemory, pictures))
 
     def __enter__(self) -> Self:
         return self
@@ -88,13 +90,9 @@ class RealTimeBench:
 
 
 def connect(
-    settings: BenchSettings,
-    wrist: WristParameters,
-    seed: int,
-    markers: Markers | None = None,
-    markers_2: Markers | None = None,
-    record: Path | None = None,
-) -> RealTimeBench:
+    settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None,
+    markers_2: Markers | None = None, record: Path | None = None,
+) -> RealTimeBench:  # fmt: skip
     """Start a bench in processes of its own, wrist and cameras. What its board did is left in the file `record`.
 
     With the markers of a second camera, `markers_2`, the wrist bends in two planes.
@@ -105,9 +103,8 @@ def connect(
     cameras, films, pictures = films_of(settings, wrist, (markers, markers_2), folder)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    bench = context.Process(
-        target=_serve, args=(theirs, films, folder, settings, wrist, seed, markers, markers_2, record), daemon=True
-    )
+    rig = partial(EmulatedRig, settings, wrist, seed, markers, markers_2=markers_2)
+    bench = context.Process(target=_serve, args=(theirs, films, folder, rig, record), daemon=True)
     with safe_path():
         bench.start()
     for end in (theirs, *films):
@@ -130,7 +127,7 @@ def films_of(
 
     One camera, or two where the second's markers are given: the wrist then bends in two planes.
     """
-    planes: tuple[Literal[0, 1] | None, ...] = (None,) if markers[1] is None else (0, 1)
+    planes = planes_seen(markers[1])
     pictures = [folder / f"frame{'' if not plane else plane + 1}" for plane in planes]
     started = [
         start_film(settings, wrist, markers[plane or 0], file, broadcast, plane)
@@ -140,26 +137,17 @@ def films_of(
 
 
 def _serve(
-    control: Connection,
-    films: Sequence[Connection],
-    folder: Path,
-    settings: BenchSettings,
-    wrist: WristParameters,
-    seed: int,
-    markers: Markers | None,
-    markers_2: Markers | None,
+    control: Connection, films: Sequence[Connection], folder: Path, make: Callable[[], EmulatedRig],
     record: Path | None,
-) -> None:
+) -> None:  # fmt: skip
     """The bench's process: Ctrl-C is the client's affair. It takes the cameras' folder with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from wristctl.bench.emulated_rig import EmulatedRig
     from wristctl.bench.server import BenchServer
     from wristctl.board.emulator.serve import PtyLine
 
     try:
         line = PtyLine()
-        rig = EmulatedRig(settings, wrist, seed, markers, markers_2=markers_2)
-        server = BenchServer(rig, line, films, record, control)
+        server = BenchServer(make(), line, films, record, control)
         signal.signal(signal.SIGTERM, lambda *_: server.stop())
         control.send(line.address)
         server.run()

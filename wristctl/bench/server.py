@@ -231,12 +231,12 @@ class BenchServer:
 
     def _take_frames(self) -> None:
         for camera, (eye, film) in enumerate(zip(self._rig.eyes, self._films, strict=True)):
-            number = eye.shutter.newest(0.0)
+            number = eye.newest(0.0)
             if number > self._taken[camera]:
                 self._taken[camera] = number
-                if self._line.there and eye.shutter.arrives(number):
+                if self._line.there and eye.arrives(number):
                     with suppress(BrokenPipeError):  # a camera that has died gives no frames
-                        film.send((eye.shutter.expose(number), self._start))
+                        film.send((eye.expose(number), self._start))
 
     def _answer(self, control: Connection) -> None:
         try:

@@ -1,7 +1,7 @@
 """The shutter of the bench's camera: which frames it takes, what they show, and when they arrive."""
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -13,6 +13,7 @@ from wristctl.config.bench import FaultKind, RenderedCamera
 from wristctl.seeds import Entropy
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import print_of
+from wristctl.vision.scene import Scene
 
 PICTURE_FAULTS: tuple[FaultKind, ...] = (
     "camera-frozen-clock", "picture-dark", "picture-bright", "picture-blurred", "picture-smeared", "picture-mirrored",
@@ -51,16 +52,6 @@ def spoiled(image: Image, kind: FaultKind, size: float, number: int, rng: np.ran
     return image
 
 
-class Painter(Protocol):
-    """Drawer of the wrist: `vision.scene.Scene`."""
-
-    def render(
-        self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
-        across: float = 0.0, turned: float = 0.0,
-    ) -> Image:  # fmt: skip
-        """The picture of segment angles (k, n) at k instants of the exposure."""
-
-
 class Exposure(NamedTuple):
     """All that a frame's picture is made of; what a frozen camera shows is another frame's."""
 
@@ -84,7 +75,7 @@ class Exposure(NamedTuple):
     """how much later than by the camera's delay it arrives [s]"""
 
 
-def picture(exposure: Exposure, painter: Painter) -> Frame:
+def picture(exposure: Exposure, painter: Scene) -> Frame:
     """Draw it; of one `shown` frame always the same."""
     rng = np.random.default_rng(exposure.noise)
     rng.random()
@@ -167,7 +158,6 @@ class Shutter:
         )  # fmt: skip
 
     def _shown(self, number: int, time: float) -> int:
-        """The frame whose picture this one shows."""
         shown = [number]
         for fault in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
             first = math.floor(self._faults.begun(fault) * self._settings.frame_rate - self._settings.phase)

@@ -15,9 +15,7 @@ from wristctl.board.emulator.atmega2560 import Atmega2560, VirtualTransport
 from wristctl.board.emulator.chip import FREQUENCY, NEVER
 from wristctl.config.bench import BenchSettings, FaultKind, SerialLine
 from wristctl.config.camera import Markers
-from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
-from wristctl.seeds import Entropy
 from wristctl.vision.camera import CameraError, Frame
 
 _BUTTON = "G", 0
@@ -130,12 +128,12 @@ class VirtualCamera:
         self._rig.catch_up()
         if self._eye.faults.on("camera-lost", self._rig.wrist.time):
             raise CameraError("the camera gives no more pictures", self.name, "injected fault")
-        shutter = self._eye.shutter
-        newest = shutter.newest(shutter.delay)
+        eye = self._eye
+        newest = eye.newest(eye.delay)
         unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
-        for number in filter(shutter.arrives, unseen):
-            if shutter.has_arrived(number):
-                return picture(shutter.expose(number), self._eye.scene)
+        for number in filter(eye.arrives, unseen):
+            if eye.has_arrived(number):
+                return picture(eye.expose(number), eye.scene)
             self._seen = number - 1  # it is still on its way
         return None
 
@@ -143,7 +141,7 @@ class VirtualCamera:
         """Nothing to give back."""
 
 
-class VirtualBench:
+class VirtualBench(EmulatedRig):
     """A wrist pulled by the step pulses of an emulated board, and a camera that sees it.
 
     Time passes while `transport` is waited on, and is of its clock. With the markers of a second camera, `markers_2`,
@@ -151,39 +149,22 @@ class VirtualBench:
     """
 
     def __init__(
-        self,
-        settings: BenchSettings,
-        wrist: WristParameters,
-        seed: int,
-        markers: Markers | None = None,
+        self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None,
         markers_2: Markers | None = None,
-    ) -> None:
-        self._rig = EmulatedRig(settings, wrist, seed, markers, markers_2=markers_2)
-        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line, self._rig.weigh)
-        self.cameras = tuple(VirtualCamera(self._rig, number) for number in range(len(self._rig.eyes)))
-        self.camera = self.cameras[0]
-
-    def face(self, direction: str) -> None:
-        """Turn the bench so that this direction's plane is the one that bends and is seen; in two planes nothing."""
-        self._rig.face(direction)
-
-    def disturb(self, disturbances: Disturbances, start: float) -> None:
-        """Let these act from `start` on, beside no trial: faults and the camera's stream go on as they are."""
-        self._rig.disturb(disturbances, start)
-
-    def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
-        """A trial's motion begins at `start`: disturbances, faults and frames of the stream `noise` count from it."""
-        self._rig.begin(start, disturbances, noise)
+    ) -> None:  # fmt: skip
+        super().__init__(settings, wrist, seed, markers, markers_2=markers_2)
+        self.transport = BenchTransport(self.chip, self.faults, settings.line, self.weigh)
+        self.cameras = tuple(VirtualCamera(self, number) for number in range(len(self.eyes)))
 
     def truth(self, since: float = 0.0) -> Truth:
         """True motion of the wrist after `since`, as far back as the last minute."""
-        self._rig.catch_up()
-        return self._rig.wrist.truth(since)
+        self.catch_up()
+        return self.wrist.truth(since)
 
     def motion(self) -> MotorMotion:
         """Motion of the motors so far, as the board commanded it."""
-        self._rig.catch_up()
-        return self._rig.wrist.motion
+        self.catch_up()
+        return self.wrist.motion
 
     def close(self) -> None:
         """Nothing to give back: here so that every bench ends alike."""

@@ -2,15 +2,8 @@
 
 import errno
 
-from wristctl.board.messages import (
-    FAULT_FIX,
-    FAULT_MEANING,
-    RESULT_FIX,
-    RESULT_MEANING,
-    Command,
-    Fault,
-    Result,
-)
+from wristctl.board.layout import FAULT_FIX, FAULT_MEANING, RESULT_FIX, RESULT_MEANING
+from wristctl.board.messages import Command, Fault, Result
 from wristctl.errors import UserError
 
 # Exit codes.

@@ -160,11 +160,10 @@ def _c_checks(entry: MessageTable) -> list[str]:
 
 
 def python_module(table: MessageTable) -> str:
-    """Return messages.py: constants, codes with their meanings, and one named tuple per message with its layout."""
+    """Return messages.py: constants, codes, and one named tuple per message."""
     protocol, commands = table["protocol"], table["commands"]
     out = [f'"""Messages between host and board. {MARK}"""', "", "from __future__ import annotations", ""]
     out += ["from enum import IntEnum, IntFlag", "from typing import NamedTuple", ""]
-    out += ["from wristctl.board.layout import Field, Layout", ""]
     out += [f"PROTOCOL_VERSION = {protocol['version']}", f"FIRMWARE_VERSION = {tuple(protocol['firmware'])}"]
     out += [f"DICTIONARY_HASH = {dictionary_hash(table):#010X}".replace("0X", "0x"), f"BAUD = {protocol['baud']}"]
     for name, entry in table["constants"].items():
@@ -172,39 +171,16 @@ def python_module(table: MessageTable) -> str:
     for kind, group in (CODES | BITS).items():
         out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):", f'    """{_KINDS[kind]}"""', ""]
         out += [f"    {name} = {_number(entry)}  # {entry['meaning']}" for name, entry in table[group].items()]
-    out += ["", ""]
-    explained = [(kind, prose) for kind in ("Result", "Fault") for prose in PROSE]
-    for kind, prose in (*explained, ("Reset", "meaning")):
-        out += [f"{kind.upper()}_{prose.upper()} = {{"]
-        for name, entry in table[(CODES | BITS)[kind]].items():
-            out += [f"    {kind}.{name}: {json.dumps(entry[prose])},"]
-        out += ["}"]
     named = {name.title(): entry for name, entry in commands.items() if entry["fields"]}
     for name, entry in (named | table["answers"]).items():
         out += _named_tuple(name, entry, table["defaults"] if name in named else {})
-    out += ["", "", "LAYOUTS: dict[type, Layout] = {"]
-    for name, entry in (named | table["answers"]).items():
-        out += [f"    {name}: Layout(", *map(_layout_field, entry["fields"].items()), "    ),"]
-    out += ["}", "COMMAND_OF: dict[type, Command] = {"]
-    out += [f"    {name}: Command.{name.upper()}," for name in named]
-    out += ["}", "ANSWER_TO: dict[Command, type] = {"]
-    out += [f"    Command.{name}: {entry['answer']}," for name, entry in commands.items() if "answer" in entry]
-    out += ["}"]
-    for name, mark in (("BOUND", "bound"), ("FEEDS_WATCHDOG", "feeds")):
-        out += [f"{name} = frozenset(", "    {"]
-        out += [f"        Command.{command}," for command, entry in commands.items() if entry[mark]]
-        out += ["    }", ")"]
     return "\n".join([*out, ""])
-
-
-def _enumeration(unit: str) -> str | None:
-    return unit if unit in CODES | BITS else None
 
 
 def _named_tuple(name: str, entry: MessageTable, defaults: MessageTable) -> list[str]:
     out = ["", "", f"class {name}(NamedTuple):", f'    """{entry["meaning"][0].upper()}{entry["meaning"][1:]}."""', ""]
     for field, (_kind, count, scale, unit, *span) in entry["fields"].items():
-        scalar = _enumeration(unit) or ("float" if scale > 1 else "int")
+        scalar = unit if unit in CODES | BITS else "float" if scale > 1 else "int"
         default = ""
         if field in defaults:
             value = defaults[field]["value"] / scale if scale > 1 else defaults[field]["value"]
@@ -213,13 +189,6 @@ def _named_tuple(name: str, entry: MessageTable, defaults: MessageTable) -> list
         typed = f"tuple[{', '.join([scalar] * count)}]" if count > 1 else scalar
         out += [f"    {field}: {typed}{default}  # {unit}{range_note}"]
     return out
-
-
-def _layout_field(item: tuple[str, list[Any]]) -> str:
-    name, (kind, count, scale, unit, *span) = item
-    lowest, highest = span or (None, None)
-    numbers = f'"{STRUCT_CODE[kind]}", {count}, {scale}, "{unit}", {lowest}, {highest}'
-    return f'        Field("{name}", {numbers}, {_enumeration(unit)}),'
 
 
 if __name__ == "__main__":

@@ -7,16 +7,13 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.exchange import Exchange, Overheard, Traffic, nobody
+from wristctl.board.exchange import Exchange, Overheard, nobody
 from wristctl.board.framing import crc
+from wristctl.board.layout import ANSWER_TO, BOUND, COMMAND_OF, LAYOUTS
 from wristctl.board.messages import (
-    ANSWER_TO,
     AXES,
-    BOUND,
-    COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
-    LAYOUTS,
     MAX_RATE,
     TOTAL_RATE,
     Command,
@@ -76,11 +73,10 @@ class Cells(Protocol):
 
 
 def _status(content: tuple[Any, ...]) -> Status:
-    """The status that an answer begins with."""
     return Status(*content[: len(Status._fields)])
 
 
-class Board:
+class Board(Exchange):
     """A motor board behind a transport. As a context manager it connects, and stops the motors in the end.
 
     Commands are sent again when no answer comes, at most ATTEMPTS times within the watchdog time; all of them are
@@ -88,11 +84,10 @@ class Board:
     """
 
     def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
-        self.transport = transport
+        super().__init__(transport, overheard)
         self.hello: Hello | None = None
         self.cells: Cells | None = None
         """Load cells that are shown every reading: `read` and `turn` ask for them too, where there are any."""
-        self._exchange = Exchange(transport, overheard)
         self._configured, self._limits, self._watchdog = Configure(), Limits(), Configure().watchdog
         self._connection = 0
 
@@ -108,21 +103,6 @@ class Board:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close(emergency=error is not None)
-
-    @property
-    def traffic(self) -> Traffic:
-        """Counts of the traffic on the wire."""
-        return self._exchange.traffic
-
-    @property
-    def bad_frames(self) -> int:
-        """Pieces that came from the board and were no frame, or had a wrong CRC."""
-        return self._exchange.bad_frames
-
-    @property
-    def round_trip(self) -> float:
-        """Seconds from the last command that was answered to its answer."""
-        return self._exchange.round_trip
 
     def connect(self) -> Hello:
         """Wait for the board, which may be starting, and see that it speaks by our message table."""
@@ -178,14 +158,14 @@ class Board:
         """
         sent = within_reach(rates)
         command, payload = self._packed(self._turning(sent, life))
-        return sent, self._exchange.post(command, self._bound(command, payload))
+        return sent, self.post(command, self._bound(command, payload))
 
     def answered(self, until: float) -> tuple[float, Status] | None:
         """When the next of the posted rates that are answered by `until` [s] were sent, and the status in the answer.
 
         None where no answer is on its way, or none comes by then.
         """
-        arrived = self._exchange.arrived(until, self._patience * ATTEMPTS)
+        arrived = self.arrived(until, self._patience * ATTEMPTS)
         if arrived is None:
             return None
         began, command, answer = arrived
@@ -272,7 +252,6 @@ class Board:
 
     @staticmethod
     def _packed(message: Command | tuple[Any, ...]) -> tuple[Command, bytes]:
-        """A message as command and payload."""
         if isinstance(message, Command):
             return message, b""
         return COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
@@ -282,13 +261,12 @@ class Board:
         return self._connection.to_bytes(2, "little") + payload if command in BOUND else payload
 
     def _seen(self, command: Command, content: tuple[Any, ...]) -> Status:
-        """The status in an answer; load cells are shown theirs."""
         if self.cells is not None and ANSWER_TO[command] is Pulls:
             self.cells.take(Pulls(*content))
         return _status(content)
 
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
-        answer = self._exchange.ask(command, self._bound(command, payload), self._patience, ATTEMPTS)
+        answer = self.ask(command, self._bound(command, payload), self._patience, ATTEMPTS)
         return self._told(command, answer)
 
     def _told(self, command: Command, answer: bytes) -> tuple[Result, tuple[Any, ...]]:
@@ -311,7 +289,7 @@ class Board:
         deadline = self.transport.now() + _START_TIME
         while True:
             try:
-                return self._exchange.ask(command, b"", _START_PATIENCE, attempts=1)
+                return self.ask(command, b"", _START_PATIENCE, attempts=1)
             except NoAnswer:
                 if self.transport.now() > deadline:
                     sent, bytes_read = self.traffic.sent, self.traffic.bytes_read
@@ -319,12 +297,12 @@ class Board:
 
     def faulted(self, status: Status) -> Faulted:
         """The error that tells of the faults of this status."""
-        return Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
+        return Faulted(self.transport.name, status.faults, self.silence, self._watchdog)
 
     def see_restart(self) -> None:
         """Raises Restarted where the board is no longer the one that we have connected to."""
         if self.hello is None:
             return
-        answer = self._exchange.ask(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
+        answer = self.ask(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
         if LAYOUTS[Hello].unpack(Hello, answer[1:]).boot_nonce != self.hello.boot_nonce:
             raise Restarted(self.transport.name)

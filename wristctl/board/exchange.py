@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from wristctl.board.board_errors import NoAnswer
 from wristctl.board.framing import Decoder, WireFrame, encode
-from wristctl.board.messages import ESTOP_SEQ, FEEDS_WATCHDOG, Command
+from wristctl.board.layout import FEEDS_WATCHDOG
+from wristctl.board.messages import ESTOP_SEQ, Command
 from wristctl.board.transport import Transport
 
 _ANSWER = 0x80
@@ -44,7 +45,6 @@ class _Sent(NamedTuple):
     """Answers that had come too late by then."""
 
     def is_answered_by(self, frame: WireFrame) -> bool:
-        """Whether a frame is the answer."""
         return (frame.code, frame.sequence) == (self.command | _ANSWER, self.sequence) and bool(frame.payload)
 
 
@@ -54,6 +54,7 @@ class Exchange:
     def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport, self._overheard = transport, overheard
         self.traffic = Traffic()
+        """Counts of the traffic on the wire."""
         self.round_trip = 0.0
         """Seconds from the last command that was answered to its answer."""
         self.silence = 0.0

@@ -36,7 +36,6 @@ def flash(port: str, image: Path = IMAGE, say: Callable[[str], None] = lambda li
 
 
 def _see_whole(image: Path) -> None:
-    """Compare an image with the check sum beside it, where there is one."""
     beside = image.with_name(image.name + ".sha256")
     if not image.exists():
         raise BoardError("host", "there is no such firmware", str(image), "name an Intel hex file", exit_code=2)

@@ -1,11 +1,17 @@
-"""Layout of a message in its bytes: little-endian, no padding, values scaled to whole counts."""
+"""Layout of each message in its bytes, little-endian, no padding, values scaled to whole counts; what it belongs to."""
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, TypeVar
 
+from wristctl.board import messages
+from wristctl.board.dictionary import BITS, CODES, PROSE, STRUCT_CODE, load
+from wristctl.board.messages import Command, Fault, Reset, Result
+
 M = TypeVar("M")
+K = TypeVar("K", bound=Enum)
 
 
 @dataclass(frozen=True)
@@ -55,3 +61,39 @@ class Layout:
             values.append(field.from_wire(counts[position : position + field.count]))
             position += field.count
         return message(*values)
+
+
+_TABLE = load()
+
+
+def _prose(kind: type[K], prose: str) -> dict[K, str]:
+    return {kind[name]: entry[prose] for name, entry in _TABLE[(CODES | BITS)[kind.__name__]].items()}
+
+
+RESULT_MEANING, RESULT_FIX = (_prose(Result, prose) for prose in PROSE)
+FAULT_MEANING, FAULT_FIX = (_prose(Fault, prose) for prose in PROSE)
+RESET_MEANING = _prose(Reset, "meaning")
+
+
+def _layout(entry: Mapping[str, Any]) -> Layout:
+    fields = []
+    for name, (code, count, scale, unit, *span) in entry["fields"].items():
+        lowest, highest = span or (None, None)
+        kind = getattr(messages, unit, None)
+        fields.append(Field(name, STRUCT_CODE[code], count, scale, unit, lowest, highest, kind))
+    return Layout(*fields)
+
+
+_COMMANDS = {Command[name]: entry for name, entry in _TABLE["commands"].items()}
+COMMAND_OF: dict[type, Command] = {
+    getattr(messages, command.name.title()): command for command, entry in _COMMANDS.items() if entry["fields"]
+}
+ANSWER_TO: dict[Command, type] = {
+    command: getattr(messages, entry["answer"]) for command, entry in _COMMANDS.items() if "answer" in entry
+}
+LAYOUTS: dict[type, Layout] = {kind: _layout(_COMMANDS[command]) for kind, command in COMMAND_OF.items()} | {
+    getattr(messages, name): _layout(entry) for name, entry in _TABLE["answers"].items()
+}
+BOUND, FEEDS_WATCHDOG = (
+    frozenset(command for command, entry in _COMMANDS.items() if entry[mark]) for mark in ("bound", "feeds")
+)

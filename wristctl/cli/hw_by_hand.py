@@ -179,7 +179,8 @@ def _says_taut(board: Board, axis: int, reeled: float) -> bool:
 def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False, debug: Debug = False) -> None:
     """Clear a latched fault once its cause is mended; drives that hold let go."""
     from wristctl.board.driver import Board
-    from wristctl.board.messages import FAULT_MEANING, Fault, State
+    from wristctl.board.layout import FAULT_MEANING
+    from wristctl.board.messages import Fault, State
     from wristctl.board.transport import open_transport
 
     plan = "a fault that is latched is cleared: drives that hold tendons let go"

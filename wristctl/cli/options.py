@@ -242,7 +242,8 @@ BAUD = 250_000
 
 def facts_of(values: dict[str, Any]) -> dict[str, Any]:
     """Names for states, faults and flags; why the board started in words; the dictionary in hex."""
-    from wristctl.board.messages import RESET_MEANING, Reset
+    from wristctl.board.layout import RESET_MEANING
+    from wristctl.board.messages import Reset
 
     named = {key: value.name or "none" if hasattr(value, "name") else value for key, value in values.items()}
     if isinstance(cause := values.get("reset_cause"), Reset):

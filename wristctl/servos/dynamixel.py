@@ -160,7 +160,6 @@ class DynamixelRig:
         self.clock.wait_until(self.clock.now() + seconds)
 
     def _set_up(self, bus: ServoBus, number: int) -> None:
-        """Settings of one servo, its torque off, each read back."""
         unit = bus.models[number].current_unit
         current = math.floor(self.settings.current / unit)
         fastest = max(1, math.floor(self.settings.rate / self.settings.spool_radius / VELOCITY_UNIT))

@@ -148,7 +148,6 @@ class ServoRehearsal:
             self.servos[self._faulty].temperature = _WARM + _WARMS * (end - self.began)
 
     def _begin(self) -> None:
-        """Have the fault happen."""
         fault, servo, row = self._fault.fault, self.servos[self._faulty], self.wrist.values[self._faulty]
         if fault == "detached":
             row[ATTACHED] = 0.0

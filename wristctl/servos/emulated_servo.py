@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from struct import Struct
 
 import numpy as np
 
@@ -73,12 +72,6 @@ def _crc_of_byte(byte: int) -> int:
 
 
 _CRCS = tuple(map(_crc_of_byte, range(256)))
-# Of the control table's items, by size and sign.
-_FORMS = {
-    (size, signed): Struct("<" + (letter if signed else letter.upper()))
-    for size, letter in ((1, "b"), (2, "h"), (4, "i"))
-    for signed in (False, True)
-}
 
 
 def stuffed(body: bytes) -> bytes:
@@ -168,11 +161,10 @@ class EmulatedServo:
         return self._get(BUS_WATCHDOG) != -1
 
     def _get(self, item: Item) -> int:
-        number: int = _FORMS[item.size, item.signed].unpack_from(self._table, item.address)[0]
-        return number
+        return item.decoded(self._table[item.address : item.address + item.size])
 
     def _put(self, item: Item, value: int) -> None:
-        _FORMS[item.size, item.signed].pack_into(self._table, item.address, value)
+        self._table[item.address : item.address + item.size] = item.encoded(value)
 
     def power_off(self) -> None:
         """Its plug is out: it neither answers nor holds anything."""

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import select
 import threading
 import time
-import tty
 from collections import deque
 from types import TracebackType
 from typing import Self
 
+from wristctl.board.emulator.serve import PtyLine
 from wristctl.servos.emulated import ServoRehearsal
 
 # Longest wait for a byte [s].
@@ -25,11 +22,8 @@ class PseudoTerminal:
     """
 
     def __init__(self, rehearsal: ServoRehearsal) -> None:
-        self._rehearsal, self._ended = rehearsal, threading.Event()
-        self._bus, self._host = pty.openpty()
-        tty.setraw(self._host)
-        self.path = os.ttyname(self._host)
-        self.lock = threading.Lock()
+        self._rehearsal, self._ended, self._line = rehearsal, threading.Event(), PtyLine()
+        self.path, self.lock = self._line.address, threading.Lock()
         self._thread = threading.Thread(target=self._serve, name="servo bus", daemon=True)
 
     def __enter__(self) -> Self:
@@ -41,8 +35,7 @@ class PseudoTerminal:
     ) -> None:
         self._ended.set()
         self._thread.join()
-        os.close(self._bus)
-        os.close(self._host)
+        self._line.close()
 
     def _serve(self) -> None:
         clock = self._rehearsal.clock
@@ -52,9 +45,9 @@ class PseudoTerminal:
             with self.lock:
                 clock.wait_until(now)
             while coming and coming[0][0] <= now:
-                os.write(self._bus, coming.popleft()[1])
+                self._line.send(coming.popleft()[1])
             wait = min(_WAIT, max(0.0, coming[0][0] - now)) if coming else _WAIT
-            if select.select([self._bus], [], [], wait)[0]:
-                data = os.read(self._bus, 4096)
+            self._line.wait(wait)
+            if data := self._line.receive():  # also the last of a client that has gone
                 with self.lock:
                     coming.extend(self._rehearsal.receive(data))

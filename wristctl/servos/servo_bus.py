@@ -91,12 +91,10 @@ def packet_handler() -> Any:
         """The SDK 4.1 sends packets without the bytes that it stuffs, and takes some out that are none."""
 
         def addStuffing(self, packet: list[int]) -> list[int]:
-            """Stuff a packet where it stands."""
             packet[:] = super().addStuffing(packet)
             return packet
 
         def removeStuffing(self, packet: list[int]) -> list[int]:
-            """Take the stuffed bytes out of a packet."""
             body = bytes(packet[7:-2]).replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
             return [*packet[:5], *(len(body) + 2).to_bytes(2, "little"), *body, *packet[-2:]]
 
@@ -152,8 +150,7 @@ class ServoBus:
 
     def answering(self) -> list[int]:
         """Ids that answer now."""
-        return [number for number in self._ids if any(self._packets.ping(self._port, number)[1] == self._fine
-                                                      for _ in range(2))]  # fmt: skip
+        return [number for number in self._ids if self.pinged(number) or self.pinged(number)]
 
     def _tried(self, number: int, address: int, size: int) -> tuple[bytes, int]:
         self._packets.readTx(self._port, number, address, size)
@@ -274,7 +271,6 @@ def opened(name: str, baud: int) -> Any:
         patience = _PATIENT
 
         def setPacketTimeout(self, packet_length: int) -> None:
-            """Wait so long for an answer of so many bytes."""
             self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + 1e3 * self.patience)
 
     port = Port(name)

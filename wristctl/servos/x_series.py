@@ -20,7 +20,7 @@ class Item(NamedTuple):
         """A value as the servo has it. Raises OverflowError where it does not fit."""
         return int(value).to_bytes(self.size, "little", signed=self.signed)
 
-    def decoded(self, data: bytes) -> int:
+    def decoded(self, data: bytes | bytearray) -> int:
         """The value of such bytes."""
         return int.from_bytes(data, "little", signed=self.signed)
 

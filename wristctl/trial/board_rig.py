@@ -55,28 +55,28 @@ def facts_of(settings: HwRunSettings, wrist: WristParameters) -> Facts:
 class _Clock:
     """The transport's clock."""
 
-    def __init__(self, transport: Transport, virtual: bool) -> None:
-        self._transport, self.virtual = transport, virtual
+    virtual = True
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
 
     def now(self) -> float:
-        """Seconds on it."""
         return self._transport.now()
 
     def wait_until(self, moment: float) -> None:
-        """Let time pass until then."""
         if (ahead := moment - self._transport.now()) > 0.0:
             self._transport.wait(ahead)
 
 
 class BoardRig:
-    """A board behind a testbed's transport, and the testbed's cameras.
+    """A board behind a testbed's transport in virtual time, and the testbed's cameras.
 
     Raises the errors of a rig, and CameraError.
     """
 
-    def __init__(self, testbed: Testbed, settings: HwRunSettings, wrist: WristParameters, virtual: bool) -> None:
+    def __init__(self, testbed: Testbed, settings: HwRunSettings, wrist: WristParameters) -> None:
         self.facts = facts_of(settings, wrist)
-        self.clock = _Clock(testbed.transport, virtual)
+        self.clock = _Clock(testbed.transport)
         self._testbed, self._settings, self._board = testbed, settings, Board(testbed.transport)
         self._seen: list[list[tuple[float, float]]] = [[] for _ in range(settings.planes)]
         self._news = [-math.inf] * settings.planes
@@ -165,4 +165,4 @@ class BenchRig(BoardRig):
     def __init__(self) -> None:
         settings, wrist = HwRunSettings(planes=2), WristParameters()
         bench = VirtualBench(BenchSettings(), wrist, 0, settings.markers, settings.markers_2)
-        super().__init__(EmulatedTestbed(bench, settings, (View(), View()), None), settings, wrist, virtual=True)
+        super().__init__(EmulatedTestbed(bench, settings, (View(), View()), None), settings, wrist)

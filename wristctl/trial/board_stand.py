@@ -108,7 +108,6 @@ class BoardStand:
         return HomedWrist(self._motors, self._tracking, self._settings, self._wrist, self._plane, zero, self._layout)
 
     def _let_go(self, homed: HomedWrist) -> None:
-        """Slacken the tendons, and give the wrist time to straighten."""
         homed.slacken()
         Patience(self._board).wait(self._settings.homing.let_go)
 

@@ -78,13 +78,8 @@ class CameraPace:
         ]
         return 1.4826 * float(np.median(np.abs(np.subtract(gaps, np.median(gaps))))) if gaps else float("nan")
 
-    @property
-    def oldest(self) -> float:
-        """Age [s] of the newest angle just before the next one comes, where one picture between them is lost."""
-        return self.oldest_after(1)
-
-    def oldest_after(self, lost: int) -> float:
-        """The same [s] where so many are lost, one after the other."""
+    def oldest(self, lost: int = 1) -> float:
+        """Age [s] of the newest angle just before the next one comes, where so many pictures between them are lost."""
         return self.latency + (1 + lost) / self.rate
 
     def said(self) -> str:
@@ -121,7 +116,7 @@ class CameraPace:
 
         `hidden` is an age [s] that their time stamps do not tell of.
         """
-        if (oldest := self.oldest + hidden) > stale:
+        if (oldest := self.oldest() + hidden) > stale:
             problem = (
                 f"{self.said()}: where one is lost the angle is {1e3 * oldest:.0f} ms old before the next, beyond "
                 f"safety.stale ({1e3 * stale:.0f} ms)"
@@ -131,7 +126,7 @@ class CameraPace:
     def _faster(self, hidden: float = 0.0) -> str:
         return (
             "a faster mode of the camera (device.fourcc: MJPG, device.frame_rate, a shorter device.exposure), or "
-            f"safety.stale of {stale_for(self.oldest + hidden):g} s at least, with a slower reference"
+            f"safety.stale of {stale_for(self.oldest() + hidden):g} s at least, with a slower reference"
         )
 
 
@@ -144,31 +139,27 @@ class CameraPaces:
     """The pace of a rig's only camera, or of each of its two."""
 
     def __init__(self) -> None:
-        self._each = [CameraPace()]
+        self.by_camera = [CameraPace()]
+        """The pace of each camera."""
 
     def expect(self, cameras: int) -> None:
         """Know how many cameras there are, before the first picture of two."""
-        if cameras > len(self._each):
-            self._each = [CameraPace(f"camera {number + 1}") for number in range(cameras)]
-
-    @property
-    def by_camera(self) -> tuple[CameraPace, ...]:
-        """The pace of each camera."""
-        return tuple(self._each)
+        if cameras > len(self.by_camera):
+            self.by_camera = [CameraPace(f"camera {number + 1}") for number in range(cameras)]
 
     def add(self, sighting: Sighting) -> None:
         """The next picture, of the camera that looks at its plane."""
-        self._each[sighting.plane].add(sighting)
+        self.by_camera[sighting.plane].add(sighting)
 
     def summary(self) -> str:
         """In words, with what could not be used of all pictures."""
-        return " ".join(pace.summary() for pace in self._each)
+        return " ".join(pace.summary() for pace in self.by_camera)
 
     def missing(self, now: float, stale: float) -> tuple[str, str]:
         """Why one camera, that with the oldest angle, has given none for `stale` seconds, and what to do about it."""
-        return min(self._each, key=lambda pace: pace.used).missing(now, stale)
+        return min(self.by_camera, key=lambda pace: pace.used).missing(now, stale)
 
     def fits(self, stale: float) -> None:
         """Raises CameraError where a camera's pictures are too few, or too old when they come, for this limit [s]."""
-        for pace in self._each:
+        for pace in self.by_camera:
             pace.fits(stale)

@@ -8,7 +8,6 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Sensor
-from wristctl.trial.marker_lag import MarkerLag
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 # Frames at rest at zero by whose median the bend across is none.
@@ -25,6 +24,8 @@ _SOUND = 0.1
 _AFTER = 0.5
 # Share by which the grey level may change before the sizes of markers are that of the light.
 _LIGHT = 0.1
+# Frames from which a lag is told, and its standard errors that are taken off.
+_LEAST_FRAMES, _SURE = 20, 3.0
 
 
 class Frame(NamedTuple):
@@ -66,6 +67,47 @@ class Recent:
         while self._values and clock - self._values[0][0] >= self._seconds:
             self._values.popleft()
         return [value for _, value in self._values]
+
+
+class MarkerLag:
+    """Lag of the marker in a motion's usable frames behind the angle that the spools should have made.
+
+    Of theta = a + b (predicted - lag rate) by least squares, less three standard errors.
+    """
+
+    def __init__(self) -> None:
+        self._count, self._squares = 0, 0.0
+        self._normal, self._moments = np.zeros((3, 3)), np.zeros(3)
+        self._least: float | None = None
+
+    def add(self, theta: float, predicted: float, rate: float) -> None:
+        """Take in the marker's angle, the predicted one [rad] and its rate [rad/s]."""
+        terms = np.array([1.0, predicted, -rate])
+        self._count, self._squares, self._least = self._count + 1, self._squares + theta * theta, None
+        self._normal += np.outer(terms, terms)
+        self._moments += theta * terms
+
+    def least(self) -> float:
+        """The lag [s] that there is at least; nan where the motion cannot tell."""
+        if self._least is None:
+            self._least = self._fitted()
+        return self._least
+
+    def _fitted(self) -> float:
+        scale = np.sqrt(self._normal.diagonal())
+        if self._count < _LEAST_FRAMES or not scale.all():
+            return math.nan
+        alike = self._normal / np.outer(scale, scale)
+        if np.linalg.eigvalsh(alike)[0] < 1e-9:
+            return math.nan
+        inverse = np.linalg.inv(alike) / np.outer(scale, scale)
+        coefficients = inverse @ self._moments
+        _, share, late = coefficients
+        if share <= 0.0:
+            return math.nan
+        left = max(0.0, self._squares - float(coefficients @ self._moments))
+        variance = left / (self._count - 3) * inverse[2, 2]
+        return float((late - _SURE * math.sqrt(variance)) / share)
 
 
 class CameraRecord:

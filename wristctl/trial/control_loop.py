@@ -18,10 +18,11 @@ from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import DERIVATIVES, Motion
-from wristctl.trial.drives import LoopDrive
+from wristctl.trial.drives import BoardDrive
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog, column_of, of_planes, of_tendons
 from wristctl.trial.rig_belief import RigBelief, names_of_planes, numbers_of
+from wristctl.trial.rig_drive import RigDrive
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Answer, HostFaults, Steering
@@ -63,7 +64,7 @@ def course_of(motion: Motion) -> Array:
 class AtZero(NamedTuple):
     """A homed, slack wrist, as a loop takes it up."""
 
-    drive: LoopDrive
+    drive: BoardDrive | RigDrive
     tracking: Tracking
     plane: str
     """In which it bends; empty for both."""
@@ -155,19 +156,20 @@ class ControlLoop:
             answer = self._answer(task, k, clock - task.begin)
             tension = answer.tension
             target = self._turn(tension, task.course[k])
+        heard = drive.heard
         values = {
             "trial": task.trial,
             "time": clock - task.begin,
             "clock": clock,
             **marker,
             **self._followed(task, k, estimate, answer),
-            "state": drive.state.name,
-            "faults": drive.faults,
-            "counted": drive.counted - task.begin,
-            "board": drive.time,
+            "state": heard.state.name,
+            "faults": heard.faults,
+            "counted": heard.counted - task.begin,
+            "board": heard.time,
             "late": clock - due,
             "woken": woken,
-            "round_trip": drive.round_trip,
+            "round_trip": heard.round_trip,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
         row = values | of_tendons(
@@ -181,7 +183,7 @@ class ControlLoop:
         took = drive.now() - clock
         self._go_on()
         culprit = self._timing.tick(clock - due, woken, took, self._skipped)
-        self.watch.ticked(clock, drive.round_trip, self._skipped, culprit)
+        self.watch.ticked(clock, heard.round_trip, self._skipped, culprit)
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
@@ -233,10 +235,9 @@ class ControlLoop:
     def _judge(self, trial: int, estimate: Estimate, position: Array, clock: float, late: float) -> None:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
         taut, _ = self._belief.taut(estimate.theta)
-        delay, drive = late + self._skipped * self._period, self._drive
-        unheard = clock - drive.counted
-        tick = Tick(clock, delay, estimate, position, taut, drive.state, drive.lapses, drive.resent, unheard)
-        tick = tick._replace(tension=drive.tension)
+        delay, heard = late + self._skipped * self._period, self._drive.heard
+        told = heard.state, heard.lapses, heard.resent, clock - heard.counted, self._drive.tension
+        tick = Tick(clock, delay, estimate, position, taut, *told)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 

@@ -188,7 +188,6 @@ class Experiment:
             raise
 
     def _stopped(self, stand: Stand, error: BaseException) -> None:
-        """Stop the motors, then note why, when and how."""
         decided = stand.now()
         halted = stand.stop(early=True)
         trial, start = self._under_way or (None, None)
@@ -207,7 +206,6 @@ class Experiment:
         return in_plane(wrist, plane) if plane else wrist
 
     def _to_rest(self, bend: Any, duration: float, rest: float) -> Motion:
-        """The way from a bend [rad] to zero, and rest there."""
         return back(bend, duration, rest, self._settings.control_period, self._settings.planes)
 
     def _warm_up(self, plane: str) -> None:

@@ -110,16 +110,15 @@ class GuardedRig:
 
     def stop(self) -> str:
         """Stop the motors; what went wrong with that, in words, empty where nothing did."""
-        try:
-            self._call("stop", self.rig.stop)
-        except UserError as error:
-            return str(error.what)
-        return ""
+        return self._trouble_of("stop", self.rig.stop)
 
     def close(self) -> str:
         """Give the rig back; what went wrong with that, in words."""
+        return self._trouble_of("close", self.rig.close)
+
+    def _trouble_of(self, name: str, function: Callable[[], Any]) -> str:
         try:
-            self._call("close", self.rig.close)
+            self._call(name, function)
         except UserError as error:
             return str(error.what)
         return ""
@@ -137,7 +136,6 @@ class GuardedRig:
             raise RigStop(what, raised_at(error) or self.where, "mend it there; --debug shows the traceback") from error
 
     def _values(self, name: str, values: Any, count: int, finite: bool = True) -> Array:
-        """Numbers of an answer (count,). Raises RigStop for others."""
         try:
             numbers = np.array(values, float)
         except (TypeError, ValueError):

@@ -12,7 +12,7 @@ rests after bends to all sides.
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -118,14 +118,19 @@ def rest_of(board: Motors, tracking: Tracking, expected: ExpectedMoves, homing: 
 
 
 class Finder:
-    """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
+    """Finds zero of enabled motors with slack tendons, one axis at a time.
+
+    Positions are microsteps reeled in from where the finder began.
+    """
 
     def __init__(
-        self, board: Motors, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves,
-        judge_slack: Callable[[Bend], None],
+        self, board: Motors, tracking: Tracking, rig: RigSettings, wrist: WristParameters, plane: str,
+        expected: ExpectedMoves,
     ) -> None:  # fmt: skip
-        self._board, self._tracking, self._settings, self._expected = board, tracking, settings, expected
-        self._spools, self._judge_slack = spools, judge_slack
+        self._board, self._tracking, self._expected = board, tracking, expected
+        settings, spools = self._settings, self._spools = rig.homing, spools_of(rig.actuator)
+        planes = names_of_planes(rig.planes, plane)
+        self._judge_slack = partial(judge_slack, settings=rig, wrist=wrist, planes=planes)
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
         )
@@ -169,12 +174,6 @@ class Finder:
         self._go()
         self._rest = self._rests()
         self._judge_slack(self._rest)
-
-    def bend_once(self, axis: int, about: int) -> None:
-        """Let an axis that bends the wrist at `about` bend it, and go again: friction inside then holds it there."""
-        self._reel(axis, about + self._pull)
-        self._bent(axis)
-        self._let_go(axis, -2 * self._pull)
 
     def line(self, axis: int, about: int) -> Line:
         """How the wrist bends by an axis that bends it at `about`. Lets go again.
@@ -221,7 +220,9 @@ class Finder:
         One that has no other is measured after the one that pulls against it most.
         """
         against = axes[-1] if len(axes) > 1 else self._expected.against(axes[0])
-        self.bend_once(against, about[against])
+        self._reel(against, about[against] + self._pull)
+        self._bent(against)
+        self._let_go(against, -2 * self._pull)  # friction inside holds it there
         return {axis: self.line(axis, about[axis]) for axis in axes}
 
     def lines(self, about: Sequence[int]) -> tuple[list[Line], Bend, list[float]]:
@@ -279,16 +280,6 @@ def slacken(
     return position
 
 
-def finder_of(
-    board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
-    expected: ExpectedMoves,
-) -> Finder:  # fmt: skip
-    """What finds zero of enabled motors with slack tendons."""
-    planes = names_of_planes(settings.planes, plane)
-    sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
-    return Finder(board, tracking, spools_of(settings.actuator), settings.homing, expected, sags)
-
-
 def find_zero(
     board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
     signs: Sequence[int] | None = None, layout: TendonLayout | None = None,
@@ -301,7 +292,7 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
-    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.plus)
+    finder, count = Finder(board, tracking, settings, wrist, plane, expected), len(expected.plus)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(count)]
     finder.slacken()
     lines, straight, taut = finder.lines(about)

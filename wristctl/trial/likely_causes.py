@@ -180,13 +180,11 @@ def _by_direction(evidence: Evidence) -> list[str]:
 
 
 def _tendons(words: Words, toward: Array) -> str:
-    """Tendons on the side of a direction, by the cosine of each; empty without one."""
     numbers = [str(number) for number, along in zip(words.numbers, toward, strict=True) if along > _SIDE]
     return f"tendon{'s' * (len(numbers) > 1)} {' and '.join(numbers)}" if numbers else ""
 
 
 def _toward(unit: Array) -> str:
-    """The anatomical direction nearest to a unit vector, in words."""
     if not unit.any():
         return ""
     name = max(TOWARD, key=lambda name: float(unit_toward(TOWARD[name]) @ unit))

@@ -4,7 +4,6 @@ Nothing is ever sent back. Whoever can send to the socket, or has the stream, mo
 reference: a socket is bound to this computer alone unless a setting asks for more.
 """
 
-import json
 import math
 import time
 from collections import Counter
@@ -12,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
@@ -41,6 +41,14 @@ WAITING, FOLLOWING, HOLDING, HOME, ENDING = "waiting", "following", "holding", "
 class _Refused(Exception):
     def __init__(self, kind: Refusal) -> None:
         self.kind = kind
+
+
+class _Content(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    bend: float | tuple[float, float]
+    seq: int | None = None
+    t: float | None = None
 
 
 class WantedBends:
@@ -106,29 +114,14 @@ class WantedBends:
 
     def _parsed(self, data: bytes) -> tuple[Array, int | None, float | None]:
         """Bend, one number or a pair [rad], seq and t of a datagram."""
-        if len(data) > LONGEST:
-            raise _Refused("malformed")
         try:
-            content = json.loads(data)
-        except (ValueError, RecursionError):
+            content = _Content.model_validate_json(data)
+        except ValidationError:
             raise _Refused("malformed") from None
-        if not isinstance(content, dict) or "bend" not in content:
+        bend = np.atleast_1d(content.bend)
+        if len(data) > LONGEST or len(bend) < self._planes:
             raise _Refused("malformed")
-        given, seq, when = content["bend"], content.get("seq"), content.get("t")
-        numbers = given if isinstance(given, list) else [given]
-        single = self._planes == 1 and not isinstance(given, list)
-        if len(numbers) != (1 if single else 2) or (seq is not None and type(seq) is not int):
-            raise _Refused("malformed")
-        return np.radians([_number(each) for each in numbers]), seq, None if when is None else _number(when)
-
-
-def _number(given: Any) -> float:
-    if type(given) not in (int, float):
-        raise _Refused("malformed")
-    try:
-        return float(given)
-    except OverflowError:
-        return math.inf
+        return np.radians(bend), content.seq, content.t
 
 
 class LiveReference:

@@ -3,7 +3,6 @@
 import errno
 import math
 import os
-import re
 import time
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -94,46 +93,22 @@ def residual_columns(planes: int, weighed: bool, own: bool = False) -> Columns:
     }
 
 
-def _of_motors(tendons: Sequence[int]) -> Columns:
-    """Columns of what the motors are told and do."""
-    where = "spool position, 0 where straight and just taut, positive reeled in"
-    return {
-        **_by_tendon(tendons, "tension", "N", "commanded"),
-        **_by_tendon(tendons, "target", "steps", f"wanted {where}"),
-        **_by_tendon(tendons, "position", "steps", "spool position by the board's status"),
-        "counted": ("s", "when the board had those positions, as the host reckons, on the trial's time"),
-        "board": ("s", "the board's own clock then"),
-        **_by_tendon(tendons, "sent", "1/s", "step rate really sent"),
-        "state": ("", "of the board"),
-        "faults": ("", "of the board"),
-        "late": ("s", "from the tick's due time to its beginning"),
-        "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
-        "round_trip": ("s", "from the tick's command to the board's answer"),
-    }
-
-
-def tick_columns(planes: int, tendons: Sequence[int] = ACTIVE) -> Columns:
-    """Columns of the control ticks of a rig with so many planes and these tendons; load cells have further ones."""
-    of_planes = _by_plane(planes, _OF_A_PLANE)
-    if planes > 1:  # no network stands behind such a reference, and the planes share the tendons
-        of_planes = {name: column for name, column in of_planes.items() if not name.startswith("bend_desired")}
-        of_planes["share"] = ("1", "share of the wanted torque that the tendons could give")
-    return {**_CLOCKS, **of_planes, **_of_motors(tendons)}
-
-
-def frame_columns(planes: int) -> Columns:
-    """Columns of a trial's frames, of one camera or of two."""
-    if planes == 1:
-        return FRAMES
-    named = {"bend" if name == "theta" else name: meaning for name, meaning in FRAMES.items() if name != "trial"}
-    return {
-        "trial": FRAMES["trial"],
-        "plane": ("", "ulnar or flexion: the bending plane that the camera looks at"),
-        **named,
-        "bend": ("rad", "bend in that plane, by the marker's angle and the other bend; empty where unusable"),
-    }
-
-
+# Of what the motors are told and do.
+_WHERE = "spool position, 0 where straight and just taut, positive reeled in"
+_OF_MOTORS: Columns = {
+    "tension": ("N", "commanded"),
+    "target": ("steps", f"wanted {_WHERE}"),
+    "position": ("steps", "spool position by the board's status"),
+    "counted": ("s", "when the board had those positions, as the host reckons, on the trial's time"),
+    "board": ("s", "the board's own clock then"),
+    "sent": ("1/s", "step rate really sent"),
+    "state": ("", "of the board"),
+    "faults": ("", "of the board"),
+    "late": ("s", "from the tick's due time to its beginning"),
+    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
+    "round_trip": ("s", "from the tick's command to the board's answer"),
+}
+_OF_TENDONS = "tension", "target", "position", "sent"
 # Columns that a robot of one's own has not, and those whose meaning is another one there.
 _OF_A_BOARD = "board", "state", "faults"
 _OF_A_RIG = {
@@ -157,23 +132,39 @@ _SEEN_BY_A_RIG: Columns = {
 }
 
 
-def tick_columns_of_a_rig(planes: int, tendons: Sequence[int]) -> Columns:
-    """Columns of the control ticks of a robot of one's own: as of the board, in its words, with measured tensions."""
-    found = {}
-    for name, (unit, meaning) in tick_columns(planes, tendons).items():
-        stem = re.sub(r"_(\d+|ulnar|flexion)$", "", name).replace("theta_measured", "bend_measured")
-        suffix = meaning[meaning.rfind(", t") :] if name[-1].isdigit() or name.endswith(PLANES) else ""
-        found[name] = unit, _OF_A_RIG[stem] + suffix if stem in _OF_A_RIG else meaning
-    measured = _by_tendon(tendons, "pull", "N", f"tension {_OF_LOOKS}")
-    return {name: column for name, column in found.items() if name not in _OF_A_BOARD} | measured
+def _in_words(columns: Columns, own: bool) -> Columns:
+    """Columns as of a board, or in the words of a robot of one's `own`."""
+    if not own:
+        return columns
+    kept = {name: column for name, column in columns.items() if name not in _OF_A_BOARD}
+    return {name: (unit, _OF_A_RIG.get(name, meaning)) for name, (unit, meaning) in kept.items()}
 
 
-def frame_columns_of_a_rig(planes: int) -> Columns:
-    """Columns of a trial's looks at a robot of one's own that were news, a row for each plane."""
+def tick_columns(planes: int, tendons: Sequence[int] = ACTIVE, own: bool = False) -> Columns:
+    """Columns of the control ticks of a rig with so many planes and these tendons.
+
+    Load cells have further ones; a robot of one's `own` has its measured tensions.
+    """
+    of_planes = _by_plane(planes, _in_words(_OF_A_PLANE, own))
+    if planes > 1:  # no network stands behind such a reference, and the planes share the tendons
+        of_planes = {name: column for name, column in of_planes.items() if not name.startswith("bend_desired")}
+        of_planes["share"] = ("1", "share of the wanted torque that the tendons could give")
+    columns = {**_CLOCKS, **of_planes}
+    for name, (unit, meaning) in _in_words(_OF_MOTORS, own).items():
+        columns |= _by_tendon(tendons, name, unit, meaning) if name in _OF_TENDONS else {name: (unit, meaning)}
+    return columns | (_by_tendon(tendons, "pull", "N", f"tension {_OF_LOOKS}") if own else {})
+
+
+def frame_columns(planes: int, own: bool) -> Columns:
+    """Columns of a trial's frames, of one camera or of two; of looks at one's `own` robot, a row for each plane."""
+    columns = _SEEN_BY_A_RIG if own else FRAMES
     if planes == 1:
-        return _SEEN_BY_A_RIG
-    named = {"bend" if name == "theta" else name: column for name, column in _SEEN_BY_A_RIG.items() if name != "trial"}
-    return {"trial": _SEEN_BY_A_RIG["trial"], "plane": ("", "ulnar or flexion: that the bend is in"), **named}
+        return columns
+    seen = "that the bend is in" if own else "the bending plane that the camera looks at"
+    bend = "" if own else "bend in that plane, by the marker's angle and the other bend; empty where unusable"
+    named = {"bend" if name == "theta" else name: column for name, column in columns.items()}
+    named["bend"] = "rad", bend or columns["theta"][1]
+    return {"trial": named.pop("trial"), "plane": ("", f"ulnar or flexion: {seen}"), **named}
 
 
 def look_columns(planes: int) -> Columns:
@@ -285,14 +276,11 @@ class TrialLog:
     ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
         self._planes, self._sightings = planes, list[Sighting]()
-        ticks, frames = tick_columns_of_a_rig(planes, tendons), frame_columns_of_a_rig(planes)
+        ticks = {**tick_columns(planes, tendons, not wired), **(OF_LOAD_CELLS if weighed and wired else {})}
+        tables = {"log": ticks, "between": ticks, "frames": frame_columns(planes, not wired)}
         if wired:
-            ticks, frames = (
-                {**tick_columns(planes, tendons), **(OF_LOAD_CELLS if weighed else {})},
-                frame_columns(planes),
-            )
-        tables = {"log": ticks, "between": ticks, "frames": frames, **({"wire": WIRE} if wired else {})}
-        if not wired:
+            tables["wire"] = WIRE
+        else:
             tables["looks"] = look_columns(planes)
         tables["residuals"] = residual_columns(planes, weighed, not wired)
         if coordinates is not None:

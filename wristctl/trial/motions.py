@@ -62,8 +62,3 @@ def back(bend: float | Array, duration: float, rest: float, period: float, plane
     rows[:, 0] += start[:, None]
     angles, tips = Angles.of(rows.reshape(DERIVATIVES * planes, len(time))), np.zeros((len(time), planes + 1))
     return Motion(time, angles, tips, turn=-start, begin=0.0, rest=duration, horizon=duration + rest)
-
-
-def at_rest(duration: float, period: float) -> Motion:
-    """Straight for so long [s]."""
-    return back(0.0, duration, 0.0, period)

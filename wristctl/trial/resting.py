@@ -59,14 +59,10 @@ def judge_rest(
         whose = f" of camera {number + 1}" if len(planes) > 1 else ""
         angles = [sighting.theta for sighting in own]
         judge_turn(angles, whose)
-        _judge_angle(float(np.median(angles)), whose, settings, wrist, plane)
+        rest = float(np.median(angles))
+        if abs(off := rest - sag_of(wrist, plane)) > math.radians(settings.homing.rest_deg):
+            raise _off(f"the slack wrist{whose} rests at {math.degrees(rest):.0f} deg", off, settings)
         _judge_noise(own, whose, settings, wrist, len(planes) == 1)
-
-
-def _judge_angle(rest: float, whose: str, settings: RigSettings, wrist: WristParameters, plane: str) -> None:
-    off = rest - sag_of(wrist, plane)
-    if abs(off) > math.radians(settings.homing.rest_deg):
-        raise _off(f"the slack wrist{whose} rests at {math.degrees(rest):.0f} deg", off, settings)
 
 
 def judge_turn(angles: Sequence[float], whose: str) -> None:

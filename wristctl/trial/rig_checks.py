@@ -12,7 +12,7 @@ from wristctl.errors import UserError
 from wristctl.rig import Refused, Spread, most, value
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
-from wristctl.trial.homing import finder_of, rest_of
+from wristctl.trial.homing import Finder, rest_of
 from wristctl.trial.rig_drive import RigTracking
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_stand import PLANE, halt_rig
@@ -83,10 +83,11 @@ class RigTrier:
         self._motors, self._tracking = RigMotors(self._rig, self._settings, stood), RigTracking(self._rig)
         self._plane = PLANE if self._facts.planes == 1 else ""
         self._expected = ExpectedMoves(self._settings, self._wrist, self._plane, self._layout)
-        before = self._silent_news(min(0.2, (self._facts.silence or math.inf) / 3.0))[:, 1:]
+        silent = min(0.2, (self._facts.silence or math.inf) / 3.0)
+        before = self._silent_looks(silent)[:, 1:]
         self._rig.send(stood)
         self._motors.wait(0.3)
-        after = self._silent_news(min(0.2, (self._facts.silence or math.inf) / 3.0))[:, 1:]
+        after = self._silent_looks(silent)[:, 1:]
         if np.isfinite(before).all() and np.isfinite(after).all():
             moved = _size(np.median(after, axis=0) - np.median(before, axis=0))
             if moved > math.radians(self._settings.homing.bend_deg):
@@ -108,7 +109,6 @@ class RigTrier:
         return np.array(rows).reshape(len(rows), 1 + self._facts.planes)
 
     def _seen(self, seconds: float) -> Array:
-        """Median of the looks of so long [s] that are news (P,) [rad]."""
         news = self._news(seconds)
         if not len(news):
             raise Unfit(f"no look of {seconds:g} s is news: the bend is nan, or its time stands still")
@@ -181,7 +181,7 @@ class RigTrier:
         return f"{', '.join(wrong)}: each Refused, and nothing moves"
 
     def _sense(self) -> str:
-        self._finder = finder_of(self._motors, self._tracking, self._settings, self._wrist, self._plane, self._expected)
+        self._finder = Finder(self._motors, self._tracking, self._settings, self._wrist, self._plane, self._expected)
         step, count = self._settings.actuator.step_length, len(self._layout.places)
         self._about = [self._finder.sense(tendon, (1, -1)) for tendon in range(count)]
         return "; ".join(
@@ -203,7 +203,6 @@ class RigTrier:
         )
 
     def _rests(self) -> Array:
-        """Bend (P,) [rad] of a wrist that was let go, once it moves no more."""
         rest = rest_of(self._motors, self._tracking, self._expected, self._settings.homing)
         return np.array([rest.theta, rest.beside][: self._facts.planes])
 
@@ -241,7 +240,7 @@ class RigTrier:
         self._rig.send(self._motors.targets_at(position))
         if stop:
             self._rig.stop()
-            news = self._silent_news(_RESPONSE)
+            news = self._silent_looks(_RESPONSE)
         else:
             self._motors.left_at(self._motors.targets_at(position))
             news = self._news(_RESPONSE)
@@ -257,8 +256,8 @@ class RigTrier:
         past = np.flatnonzero((along > max(_BEGUN * meant, 4.0 * self._noise)) & (news[:, 0] >= sent_at))
         return (float(news[past[0], 0] - sent_at) if len(past) else math.nan), last / meant
 
-    def _silent_news(self, seconds: float) -> Array:
-        """As `_news`, and nothing is sent meanwhile."""
+    def _silent_looks(self, seconds: float) -> Array:
+        """All looks of so long [s], as `_news` has them, while nothing is sent."""
         rows, end = list[list[float]](), self._rig.now() + seconds
         while self._rig.now() < end:
             seen = self._rig.look()

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.messages import State
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.rig import value
 from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.camera_pace import CameraPaces
+from wristctl.trial.drives import Heard
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_words import AGAINST
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Follower
@@ -26,76 +27,51 @@ _CLOCKS = 1e-3
 _UNSEEN = np.full((2, 4, 2), np.nan)
 
 
-class RigDrive:
+class RigDrive(RigMotors):
     """Motors that follow targets after a delay, with a lag: microsteps of `actuator.step_length`, positive reeling in.
 
-    `zero` are the targets (T,) at which every tendon of the straight wrist is just taut. What is believed of the spools
-    is what was sent, after the delay and the lag of the rig's facts and at no more than its rate; where looks say where
-    the motors are, they are as far from there as when they were looked at.
+    Its home is where every tendon of the straight wrist is just taut. What is believed of the spools is what was sent,
+    after the delay and the lag of the rig's facts and at no more than its rate; where looks say where the motors are,
+    they are as far from there as when they were looked at.
     """
 
-    lapses, resent = 0, 0
-    state, faults = State.ENABLED, ""
-
-    def __init__(self, rig: GuardedRig, settings: HwRunSettings, zero: Array) -> None:
-        facts = rig.facts
-        self._rig, self._zero, self._period = rig, np.asarray(zero, float), settings.control_period
-        self._step, self._unit = settings.actuator.step_length, facts.metres_per_unit
-        delay, lag = value(facts.drive.delay), value(facts.drive.lag)
-        self._motor = Follower(delay, lag, facts.limits.rate / self._step)
+    def __init__(self, rig: GuardedRig, settings: HwRunSettings, stood: Array) -> None:
+        super().__init__(rig, settings, stood)
+        drive, self._period = rig.facts.drive, settings.control_period
+        delay, lag = value(drive.delay), value(drive.lag)
+        self._motor = Follower(delay, lag, rig.facts.limits.rate / self._step)
         self._ahead, self._fastest = delay + lag + 0.5 * self._period, self._motor.speed * self._period
-        self._target = self._place = np.zeros(len(self._zero))
-        self._sent, self.counted = np.zeros(len(self._zero)), 0.0
         self._remembered: deque[Array] = deque(maxlen=remembered_commands(delay, self._period))
-        self._reckoned_at, self._off = deque[tuple[float, Array]](maxlen=_REMEMBERED), np.zeros(len(self._zero))
-
-    def at(self, targets: Array) -> None:
-        """Say at which targets (T,) [facts.unit] the motors stand."""
-        self._target = self._place = (targets - self._zero) * (self._unit / self._step)
+        self._reckoned_at = deque[tuple[float, Array]](maxlen=_REMEMBERED)
 
     @property
-    def targets(self) -> Array:
-        """Targets (T,) that were sent last [facts.unit]."""
-        targets: Array = self._zero + self._target * (self._step / self._unit)
-        return targets
+    def _target(self) -> Array:
+        return self._at / self._step
 
     def begin(self) -> None:
         """The motors stand where they were sent last."""
-        self._place, self._sent = self._target, np.zeros(len(self._zero))
+        self._place, self._off = self._target, np.zeros(len(self._at))
         self._remembered.extend([self._target] * (self._remembered.maxlen or 0))
-        self.counted = self._rig.now()
+        self.sent, self._counted = np.zeros(len(self._at)), self._rig.now()
+        """Rates that the last targets ask for (T,) [1/s], and when the places were reckoned [s]."""
         self._reckoned_at.clear()
-        self._reckoned_at.append((self.counted, self._place))
+        self._reckoned_at.append((self._counted, self._place))
 
     @property
-    def time(self) -> float:
-        """Of the rig's clock when the places were reckoned."""
-        return self.counted
-
-    @property
-    def round_trip(self) -> float:
-        """Seconds that the last `send` took."""
-        return self._rig.took
-
-    @property
-    def sent(self) -> Array:
-        """Rates that the last targets ask for (T,) [1/s]."""
-        return self._sent
+    def heard(self) -> Heard:
+        """As reckoned; a rig that does not follow raises."""
+        return Heard(self._counted, self._counted, self._rig.took)
 
     @property
     def tension(self) -> Array:
         """Of the rig's last look."""
-        none = np.full(len(self._zero), math.nan)
+        none = np.full(len(self._at), math.nan)
         return none if self._rig.tension is None else self._rig.tension
 
     @property
     def moving(self) -> bool:
         """Whether a motor is believed to be more than a step from its target."""
         return bool((np.abs(self._place - self._target) > 1.0).any())
-
-    def now(self) -> float:
-        """On the rig's clock."""
-        return self._rig.now()
 
     def wait_until(self, moment: float) -> None:
         """On the rig's clock."""
@@ -112,7 +88,7 @@ class RigDrive:
         return self._place + self._off
 
     def lead(self, target: Array, moving: Array) -> Array:
-        """As `LoopDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
+        """As `BoardDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
         wanted = target + moving * self._ahead
         self._send(self._target + np.clip(wanted - self._target, -self._fastest, self._fastest))
         behind = wanted - self._target
@@ -123,22 +99,22 @@ class RigDrive:
         self._send(self._target)
 
     def _send(self, steps: Array) -> None:
-        sent = self._rig.send(self._zero + steps * (self._step / self._unit))
-        before, self._target = self._target, (sent - self._zero) * (self._unit / self._step)
-        self._sent = (self._target - before) / self._period
+        before = self._target
+        self.left_at(self._rig.send(self.targets_at(steps * self._step)))
+        self.sent = (self._target - before) / self._period
 
     def listen(self, until: float) -> None:
         """A rig answers when it is asked."""
 
     def go_on(self, ticks: int) -> list[Array]:
-        """As `LoopDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
+        """As `BoardDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
         means = []
         for _ in range(ticks):
             self._remembered.appendleft(self._target)
             self._place, mean = self._motor.over(self._place, np.array(self._remembered).T, self._period)
             means.append(mean + self._off)
             self._reckoned_at.append((self._reckoned_at[-1][0] + self._period, self._place))
-        self.counted = self._rig.now()
+        self._counted = self._rig.now()
         return means
 
 

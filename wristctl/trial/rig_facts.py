@@ -10,7 +10,8 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.check import Adapter, RoundTrips, adapter_of, round_trips, shorter
 from wristctl.board.driver import Board
-from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
+from wristctl.board.layout import LAYOUTS
+from wristctl.board.messages import Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces, stale_for
@@ -170,7 +171,6 @@ def _rest(seen: Sequence[Sequence[Sighting]], settings: HwRunSettings, wrist: Wr
 
 
 def _ids(settings: HwRunSettings) -> list[tuple[int, int]]:
-    """Ids of the markers that each of two cameras should see."""
     return [(markers.base, markers.tip) for markers in (settings.markers, settings.markers_2)]
 
 
@@ -183,7 +183,7 @@ def _direction_of(axis: int, bend: Bend, expected: ExpectedMoves) -> AxisDirecti
     return AxisDirection(axis, math.atan2(bend.away, bend.theta), expected.place(axis), astray)
 
 
-def _watched(tracking: Tracking, testbed: Testbed) -> tuple[tuple[CameraPace, ...], list[Sighting]]:
+def _watched(tracking: Tracking, testbed: Testbed) -> tuple[list[CameraPace], list[Sighting]]:
     clock, paces, sightings = testbed.transport, CameraPaces(), []
     paces.expect(len(tracking.zero))
     tracking.look()
@@ -225,7 +225,6 @@ def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Troubl
 
 
 def _of_the_views(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
-    """Cameras that show the other one's markers."""
     shown = [" and ".join(map(str, camera.foreign)) for camera in facts.cameras]
     if all(shown):
         problem = f"the cameras are exchanged: camera 1 shows markers {shown[0]}, camera 2 markers {shown[1]}"
@@ -281,22 +280,17 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
     else:
-        met += _of_two_lost(pace.oldest_after(2) + hidden, pace.whose, settings.safety.stale)
+        if (oldest := pace.oldest(2) + hidden) > settings.safety.stale:
+            problem = (
+                f"where two pictures{pace.whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old "
+                f"before the next: beyond safety.stale ({1e3 * settings.safety.stale:.0f} ms), that ends a trial"
+            )
+            fix = f"a faster mode of the camera, or --set safety.stale={stale_for(oldest):g}"
+            met.append(Trouble(False, problem, fix))
     if pace.jitter * pace.rate > _UNEVEN:
         problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
     return met
-
-
-def _of_two_lost(oldest: float, whose: str, stale: float) -> list[Trouble]:
-    """Trouble where two pictures in a row are lost: the angle is `oldest` [s] before the next, more than `stale`."""
-    if oldest <= stale:
-        return []
-    problem = (
-        f"where two pictures{whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old before the "
-        f"next: beyond safety.stale ({1e3 * stale:.0f} ms), that ends a trial"
-    )
-    return [Trouble(False, problem, f"a faster mode of the camera, or --set safety.stale={stale_for(oldest):g}")]
 
 
 def _of_the_age(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:

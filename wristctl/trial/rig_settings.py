@@ -21,6 +21,8 @@ _MICROSTEPS = 3200
 _FINE = 4.0
 # Relative difference below which two levers are alike.
 _ALIKE = 1e-3
+# How far a tendon may be from where a rig's facts have it, over its radius: some 17 deg; and what is no distance [m].
+_NEAR, _NOWHERE = 0.3, 1e-6
 _METHODS = ("connect", "send", "look", "stop", "close")
 
 
@@ -93,10 +95,6 @@ def layout_of_facts(facts: Facts, where: str) -> TendonLayout:
     return layout
 
 
-# How far a tendon may be from where a rig's facts have it, over its radius: some 17 deg; and what is no distance [m].
-_NEAR, _ALIKE = 0.3, 1e-6
-
-
 def _places(facts: Facts) -> tuple[TendonPlace, ...]:
     return tuple(TendonPlace(angle_deg=float(one.angle_deg), radius=float(one.radius)) for one in facts.tendons)
 
@@ -121,7 +119,7 @@ def wrist_of(facts: Facts, wrist: WristParameters, where: str) -> WristParameter
         if (off > _NEAR * np.array([place.radius for place in here.places])).any():
             fix = "leave the key out: the rig's facts say where its tendons are"
             raise UserError("the study's tendons are not those of the rig", "wrist.tendons", fix)
-        if (off > _ALIKE).any():
+        if (off > _NOWHERE).any():
             places = tuple(TendonPlace(angle_deg=math.degrees(place.angle), radius=place.radius)
                            for place in there.places if place.radius > 0.0)  # fmt: skip
     try:
@@ -157,7 +155,6 @@ def settings_of(facts: Facts, settings: HwRunSettings, where: str) -> HwRunSetti
 
 
 def _missing(section: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that a section was not given."""
     return {name: each for name, each in values.items() if name not in section.model_fields_set}
 
 
@@ -208,11 +205,11 @@ def share_of_pair(layout: TendonLayout | None, planes: int) -> float:
 
 
 def as_modelled(wrist: WristParameters, layout: TendonLayout | None, planes: int) -> WristParameters:
-    """The wrist as models of a rig with these tendons have it; None: of a board with its four."""
-    return wrist if layout is None or planes == 2 else sides_of(wrist, layout)
+    """The wrist as models of a rig with these tendons have it; None: of a board with its four.
 
-
-def sides_of(wrist: WristParameters, layout: TendonLayout) -> WristParameters:
-    """The wrist in one plane whose tendons have the lever of this layout's, as models in one plane have it."""
+    In one plane the model's tendons have the lever of this layout's.
+    """
+    if layout is None or planes == 2:
+        return wrist
     lever = float(np.abs(layout.cross_section[:, 0]).max())
     return wrist.model_copy(update={"tendons": "four", "tendon_radius": math.sqrt(2.0) * lever})

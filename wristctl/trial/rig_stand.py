@@ -21,7 +21,6 @@ from wristctl.trial.motors_ready import Halt
 from wristctl.trial.resting import judge_looks, judge_weight
 from wristctl.trial.rig_belief import layout_of_rig, names_of_planes
 from wristctl.trial.rig_drive import RigDrive, RigTracking
-from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.trials import Trial
 from wristctl.trial.zero_checks import HomedWrist
@@ -80,9 +79,9 @@ class RigStand:
         assert layout is not None
         self._settings, self._wrist, self._layout = settings, wrist, layout
         self._plane = PLANE if settings.planes == 1 else ""
-        self._drive = RigDrive(self._rig, settings, np.zeros(len(layout.places)))
-        self._drive.begin()
-        self._drive.go_on(1)
+        drive = RigDrive(self._rig, settings, np.zeros(len(layout.places)))
+        drive.begin()
+        drive.go_on(1)
 
     def now(self) -> float:
         """On the rig's clock."""
@@ -95,16 +94,14 @@ class RigStand:
         """The wrist, homed once: the rig is connected before its first trial."""
         if self.zero is None:
             self._confirm()
-            self._motors = RigMotors(self._rig, self._settings, self._rig.connect())
+            self._drive = RigDrive(self._rig, self._settings, self._rig.connect())
             self._tracking = RigTracking(self._rig)
             self.zero = self.home()
-        self._drive = RigDrive(self._rig, self._settings, np.array(self.zero.targets))
-        self._drive.at(self._motors.targets)
         return AtZero(self._drive, self._tracking, self._plane)
 
     def home(self) -> Zero:
         """Zero of a connected rig, at which its tendons stand then; bends are of the straight wrist from here on."""
-        settings, motors, tracking = self._settings, self._motors, self._tracking
+        settings, motors, tracking = self._settings, self._drive, self._tracking
         judge_weight(settings, self._wrist, names_of_planes(settings.planes, PLANE))
         judge_looks(Patience(motors).sightings(tracking, 4 * settings.homing.frames), settings, self._rig.where)
         zero = find_zero(motors, tracking, settings, self._wrist, self._plane, layout=self._layout)
@@ -123,9 +120,8 @@ class RigStand:
     def check(self) -> None:
         """As `BoardStand.check`, and that the wrist rests straight; it stays slack until the next trial."""
         assert self.zero is not None
-        motors, tracking = self._motors, self._tracking
-        motors.left_at(self._drive.targets)
-        homed = HomedWrist(motors, tracking, self._settings, self._wrist, self._plane, self.zero, self._layout)
+        drive, tracking = self._drive, self._tracking
+        homed = HomedWrist(drive, tracking, self._settings, self._wrist, self._plane, self.zero, self._layout)
         homed.check_straight(self._rig.where)
         homed.check_cocontraction()
         homed.check_tendons()

@@ -262,7 +262,6 @@ class RigStrokes:
         return bend
 
     def _stroke(self, low: int, high: int, before: float) -> list[MotorStroke]:
-        """One stroke, as each camera saw it."""
         move = RampedMove(high - low, round(_SPEED / self._step), self._ramp)
         still, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
         seen = np.concatenate([still[1], moved[1]])
@@ -301,7 +300,6 @@ class RigStrokes:
 
 
 def _largest(bend: Bend) -> float:
-    """Size [rad] of a bend in the plane that bends most."""
     return max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0)
 
 

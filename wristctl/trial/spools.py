@@ -41,7 +41,6 @@ class Spools:
 
     step: float
     """Tendon moved by one microstep [m]."""
-    pulley_radius: float
     stiffness: float
     """Stiffness of one tendon [N/m]."""
     speed: float
@@ -50,10 +49,6 @@ class Spools:
     """Largest change of it by the host [1/s^2]."""
     timing: Timing
     """Of the board, as believed; lengths in steps."""
-
-    def torque(self, tension: Array) -> Array:
-        """Torque at the pulley [N m] that these tensions [N] ask of the motors."""
-        return tension * self.pulley_radius
 
     def target(self, tension: Array, taut: Array) -> Array:
         """Positions [steps] at which tendons that are taut when reeled in by `taut` [m] have these tensions [N]."""
@@ -88,18 +83,20 @@ class Spools:
 
         They were at `place` when rates took effect in the last tick, of which the newest of `rates` (4, n) [1/s] are.
         """
-        return _where_spools_are(self.timing, place, rates, math.nan, period)
+        return self.reckoned(place, rates, math.nan, period)
 
     def reckoned(self, place: Array, rates: Array, time: float, period: float) -> Array:
         """Positions (4,) [steps] at a time [s] in this tick, of which the newest of `rates` are."""
-        return _where_spools_are(self.timing, place, rates, time, period)
+        places: Array = np.empty(len(place))
+        sent = (0,) * rates.shape[1]
+        _places(np.array(self.timing), place, np.ascontiguousarray(rates), sent, time, period, places)
+        return places
 
 
 def spools_of(actuator: Actuator) -> Spools:
     """The spools of an actuator section."""
     return Spools(
         actuator.step_length,
-        actuator.pulley_radius,
         actuator.tendon_stiffness,
         actuator.step_rate,
         actuator.step_acceleration,
@@ -162,12 +159,6 @@ def _followed(motor: Any, place: Any, targets: Any, sent: Any, period: float, en
         own = part(rows_of(targets[axis]), 0, sent)
         out[axis], _, summed = motor_at(follower, before[axis], own, period + zero_like(before[axis]), period)
         mean[axis] = summed / period
-
-
-def _where_spools_are(timing: Timing, place: Array, rates: Array, time: float, period: float) -> Array:
-    places: Array = np.empty(len(place))
-    _places(np.array(timing), place, np.ascontiguousarray(rates), (0,) * rates.shape[1], time, period, places)
-    return places
 
 
 @kernel

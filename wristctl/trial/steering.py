@@ -12,7 +12,7 @@ from wristctl.config.bench import InjectedFault
 from wristctl.config.plant import Sensor
 from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
+from wristctl.control.response import OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.observer import knowing_in_lanes, propagate
@@ -31,11 +31,6 @@ class Answer(NamedTuple):
     torque: Array
     share: float
     tension: Array
-
-    @property
-    def saturated(self) -> bool:
-        """Whether the wanted torque is out of the tendons' reach."""
-        return not self.share >= FULL
 
 
 class _Observer(NamedTuple):
@@ -190,19 +185,19 @@ def _predict(known: Any, observer: Any, tick: int, reeled: Any, h: float) -> Non
     propagate(knowing, now, counts, h)
 
 
-class HostFaults:
+class HostFaults(Faults):
     """Faults of the bench that happen in the control loop; times count from the trial's motion."""
 
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
-        self._faults = Faults(faults)
-        self._faults.begin(0.0)
+        super().__init__(faults)
+        self.begin(0.0)
 
     def answer(self, answer: Any, time: float) -> Any:
         """The law's answer, in any planes; NaN under model-nan. Raises ArithmeticError under controller-exception."""
-        if self._faults.on("controller-exception", time):
+        if self.on("controller-exception", time):
             raise ArithmeticError("injected fault")
-        return answer._replace(torque_wanted=math.nan) if self._faults.on("model-nan", time) else answer
+        return answer._replace(torque_wanted=math.nan) if self.on("model-nan", time) else answer
 
     def disk(self, time: float) -> bool:
         """Whether the disk is full."""
-        return self._faults.on("disk-full", time)
+        return self.on("disk-full", time)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from wristctl.config.hw_run import Homing
 from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.resting import judge_turn
 from wristctl.trial.rig_belief import RigBelief
+from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tracking import Tracking, bend_of
 from wristctl.trial.watch import Watch
@@ -36,49 +37,6 @@ _LOOK = 0.05
 _READING = 2.0
 
 
-class Waits(Protocol):
-    """A clock that can be waited on."""
-
-    def now(self) -> float:
-        """Seconds on it."""
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass."""
-
-
-class Motors(Protocol):
-    """Motors that homing moves step by step: a board's, or a rig's (`wristctl.trial.rig_motors.RigMotors`)."""
-
-    @property
-    def transport(self) -> Waits:
-        """Their clock."""
-
-    @property
-    def cells(self) -> Cells | None:
-        """Load cells of their tendons."""
-
-    def read(self) -> Any:
-        """A Status, of as many axes as there are."""
-
-    def ping(self) -> None:
-        """Say that somebody is there."""
-
-    def jog(self, positions: Sequence[int]) -> Any:
-        """Creep to these positions (T,) [steps] before zero is known, and wait until they stand there."""
-
-    def go_to(self, positions: Sequence[int], rate: int) -> Any:
-        """Go to these positions (T,) [steps] no faster than so [steps/s], and wait; the status then."""
-
-    def home(self) -> Any:
-        """Call zero where they stand."""
-
-    def faulted(self, status: Any) -> Exception:
-        """The error of a status in a fault."""
-
-    def see_restart(self) -> None:
-        """Raises where positions are no longer those of before."""
-
-
 class WoundAxes:
     """The first so many axes of a board as motors: those that wind a tendon. The others stand."""
 
@@ -96,11 +54,11 @@ class WoundAxes:
         return self._of_these(self._board.read())
 
     def jog(self, positions: Sequence[int]) -> Any:
-        """As `Motors.jog`."""
+        """As `Board.jog`, of these axes."""
         return self._of_these(self._board.jog(self._all(positions)))
 
     def go_to(self, positions: Sequence[int], rate: int) -> Any:
-        """As `Motors.go_to`."""
+        """As `Board.go_to`, of these axes."""
         return self._of_these(self._board.go_to(self._all(positions), rate))
 
     def _of_these(self, status: Any) -> Any:
@@ -108,6 +66,10 @@ class WoundAxes:
 
     def _all(self, positions: Sequence[int]) -> list[int]:
         return [*positions, *[0] * (AXES - self._count)]
+
+
+Motors = Board | WoundAxes | RigMotors
+"""Motors that homing moves step by step: a board's, or a rig's."""
 
 
 class Reading(NamedTuple):
@@ -154,10 +116,6 @@ class Patience:
         end = self._board.transport.now() + seconds
         while (left := end - self._board.transport.now()) > 0.0:
             self.pulse(left)
-
-    def angle(self, tracking: Tracking, frames: int) -> float:
-        """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
-        return self.reading(tracking, frames).theta
 
     def reading(self, tracking: Tracking, frames: int) -> Reading:
         """Medians of the next usable frames. Raises SafetyStop where none come."""

@@ -1,8 +1,6 @@
 """Testbeds of trials: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -34,48 +32,40 @@ BEFORE_MOTION = (
 )
 
 
-class Testbed(Protocol):
-    """Board and camera with the wrist before them."""
+class _Testbed:
+    """Board and cameras with the wrist before them."""
 
     emulated: bool
     transport: Transport
 
-    def confirm(self, meanwhile: Meanwhile) -> None:
-        """Have a person agree to the first motion. Raises UserError, and what `meanwhile` raises."""
+    def __init__(self, settings: RigSettings, views: Sequence[View], cameras: Sequence[Camera]) -> None:
+        self._settings, self._views, self._cameras = settings, views, cameras
+        self._tracking: Tracking | None = None
+
+    def _watched(self, camera: Camera, tracker: Tracker) -> InlineTracking:
+        raise NotImplementedError
 
     def tracking(self) -> Tracking:
-        """The camera, or both, with fresh trackers."""
-
-    def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """Have the wrist turned so that this direction's plane is the one that bends and is seen.
-
-        Of a wrist that bends in two planes nothing is asked.
-        """
-
-    def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
-        """A trial's motion starts at `start` on the transport's clock; what is drawn of it comes from this stream."""
-
-    def truth(self, since: float) -> Array:
-        """Rows (time since then, coordinates, the last disc's bend or bends, pulls) of an emulated wrist; none of a
-        real one."""
+        """The camera, or both in the order of their planes, with fresh trackers."""
+        if self._tracking is not None:
+            self._tracking.close()
+        settings = self._settings
+        if settings.planes == 1:
+            self._tracking = self._watched(self._cameras[0], Tracker(settings.markers, self._views[0], settings.gates))
+            return self._tracking
+        first = Tracker(settings.markers, self._views[0], settings.gates, plane=0)
+        second = Tracker(settings.markers_2, self._views[1], settings.gates, plane=1)
+        both = zip(self._cameras, (first, second), strict=True)
+        self._tracking = PairedTracking([self._watched(camera, tracker) for camera, tracker in both])
+        return self._tracking
 
     def close(self) -> None:
         """Give everything back."""
+        if self._tracking is not None:
+            self._tracking.close()
 
 
-def _tracking(
-    make: Callable[[Camera, Tracker], InlineTracking | ThreadedTracking], cameras: Sequence[Camera],
-    settings: RigSettings, views: Sequence[View],
-) -> Tracking:  # fmt: skip
-    """Cameras in the order of their planes, each with a fresh tracker."""
-    if settings.planes == 1:
-        return make(cameras[0], Tracker(settings.markers, views[0], settings.gates))
-    first = Tracker(settings.markers, views[0], settings.gates, plane=0)
-    second = Tracker(settings.markers_2, views[1], settings.gates, plane=1)
-    return PairedTracking([make(camera, tracker) for camera, tracker in zip(cameras, (first, second), strict=True)])
-
-
-class EmulatedTestbed:
+class EmulatedTestbed(_Testbed):
     """The emulated bench; in virtual time it looks when asked, in real time in a thread."""
 
     emulated = True
@@ -83,37 +73,32 @@ class EmulatedTestbed:
     def __init__(
         self, bench: VirtualBench | RealTimeBench, settings: RigSettings, views: Sequence[View], keep: Kept | None
     ) -> None:
-        self._bench, self._settings, self._views, self._keep = bench, settings, views, keep
-        self.transport: Transport = bench.transport
-        self._tracking: Tracking | None = None
+        super().__init__(settings, views, bench.cameras)
+        self._bench, self._keep = bench, keep
+        self.transport = bench.transport
 
     def confirm(self, meanwhile: Meanwhile) -> None:
         """Wait for a while, then agree."""
         self._person(meanwhile)
 
-    def tracking(self) -> Tracking:
-        """The rendered camera, or both, with fresh trackers."""
-        if self._tracking is not None:
-            self._tracking.close()
+    def _watched(self, camera: Camera, tracker: Tracker) -> InlineTracking:
         kind = ThreadedTracking if isinstance(self._bench, RealTimeBench) else InlineTracking
         cameras = self._settings.bench.camera, self._settings.bench.camera_2
         noisy = all(camera.scene.noise > 0.0 for camera in cameras[: self._settings.planes])
-        make = partial(kind, keep=self._keep, now=self.transport.now, noisy=noisy)
-        self._tracking = _tracking(make, self._bench.cameras, self._settings, self._views)
-        return self._tracking
+        return kind(camera, tracker, self._keep, self.transport.now, noisy)
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """Wait for a while, then turn the wrist; in two planes nobody needs to."""
+        """Wait for a while, then turn the wrist to this direction's plane; in two planes nobody needs to."""
         if self._settings.planes == 1:
             self._person(meanwhile)
             self._bench.face(direction)
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
-        """Disturbances and faults count from here."""
+        """A trial's motion starts at `start` on the transport's clock: disturbances, faults and noise count from it."""
         self._bench.begin(start, disturbances, noise)
 
     def truth(self, since: float) -> Array:
-        """True motion of the emulated wrist since then."""
+        """Rows (time since then, coordinates, the last disc's bend or bends, pulls) of the emulated wrist."""
         truth = self._bench.truth(since)
         return np.column_stack([truth.time - since, truth.theta, truth.angle, truth.pull])
 
@@ -131,48 +116,42 @@ class EmulatedTestbed:
 
     def close(self) -> None:
         """End the eye and the bench."""
-        if self._tracking is not None:
-            self._tracking.close()
+        super().close()
         self._bench.close()
 
 
-class RealTestbed:
+class RealTestbed(_Testbed):
     """A real board and camera; the operator turns the wrist. Raises PortUnusable and CameraError."""
 
     emulated = False
 
     def __init__(self, settings: RigSettings, views: Sequence[View], keep: Kept | None, ask: Ask) -> None:
-        self._settings, self._views, self._keep, self._ask = settings, views, keep, ask
+        self._devices: list[DeviceCamera] = []
+        super().__init__(settings, views, self._devices)
+        self._keep, self._ask = keep, ask
         sources = (settings.camera, settings.camera_2)[: settings.planes]
         if len(set(sources)) < settings.planes:
             problem = f"camera 1 and camera 2 are the same, {settings.camera}"
             raise CameraError(problem, "camera_2", "--set camera_2=NUMBER of the camera at a right angle to the first")
-        self.transport: Transport = open_transport(settings.port, settings.baud)
-        self._cameras: list[DeviceCamera] = []
+        self.transport = open_transport(settings.port, settings.baud)
         try:
             for number, source in enumerate(sources, 1):
                 try:
-                    self._cameras.append(DeviceCamera(source, settings.device))
+                    self._devices.append(DeviceCamera(source, settings.device))
                 except CameraError as error:
                     if settings.planes == 1:
                         raise
                     raise error.of(number) from error
         except BaseException:
-            self._close_devices()
+            self.close()
             raise
-        self._tracking: Tracking | None = None
 
     def confirm(self, meanwhile: Meanwhile) -> None:
-        """Ask."""
+        """Ask a person to agree to the first motion. Raises UserError, and what `meanwhile` raises."""
         self._ask(BEFORE_MOTION.format(self._settings.safety.motor_pull), meanwhile)
 
-    def tracking(self) -> Tracking:
-        """The camera, or both, with fresh trackers."""
-        if self._tracking is not None:
-            self._tracking.close()
-        make = partial(ThreadedTracking, keep=self._keep)
-        self._tracking = _tracking(make, self._cameras, self._settings, self._views)
-        return self._tracking
+    def _watched(self, camera: Camera, tracker: Tracker) -> InlineTracking:
+        return ThreadedTracking(camera, tracker, self._keep)
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
         """Ask the operator to turn the wrist; in two planes nobody needs to."""
@@ -190,20 +169,19 @@ class RealTestbed:
 
     def close(self) -> None:
         """Give back cameras and port."""
-        if self._tracking is not None:
-            self._tracking.close()
-        self._close_devices()
-
-    def _close_devices(self) -> None:
-        for camera in self._cameras:
+        super().close()
+        for camera in self._devices:
             camera.close()
         self.transport.close()
+
+
+Testbed = EmulatedTestbed | RealTestbed
 
 
 def open_testbed(
     settings: RigSettings, wrist: WristParameters, seed: int, view: View, ask: Ask, keep: Kept | None = None,
     view_2: View | None = None,
-) -> EmulatedTestbed | RealTestbed:  # fmt: skip
+) -> Testbed:  # fmt: skip
     """The stand of these settings, with the views of its cameras. Raises BoardError and CameraError.
 
     `keep` takes what both cameras see; of a real rig, or in real time, each calls it from a thread of its own.

@@ -6,13 +6,14 @@ import time
 import zlib
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.loop_priority import beside_the_loop
 from wristctl.trial.camera_pace import CameraPaces
+from wristctl.trial.rig_drive import RigTracking
 from wristctl.vision.camera import Camera, CameraError, Frame
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
@@ -73,49 +74,13 @@ def _alike(before: _Known, now: _Known) -> bool:
 Kept = Callable[[Frame, Sighting], None]
 
 
-class Tracking(Protocol):
-    """Gives sightings to the loop."""
-
-    zero: tuple[float, ...]
-    """Marker angle of the straight wrist [rad] as each camera sees it, taken off its every angle."""
-    pace: CameraPaces | None
-    """Counts looks in words of its own; None: pictures are."""
-    apart: float
-    """Seconds between two usable sightings that a reading is waited for, beyond what it is for any."""
-
-    def look(self) -> list[Sighting]:
-        """Sightings since the last look, oldest first, of one camera or of both; never waits for a frame."""
-
-    def bend(self, sighting: Sighting, other: float) -> float:
-        """Bend about the sighting's plane [rad] of a wrist in two planes, where that about the other one is `other`."""
-
-    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
-        """Set the bending plane square, for a camera that has not been calibrated: `Tracker.stand_square`.
-
-        Of two cameras it is done for the one that the first sighting is of.
-        """
-
-    def close(self) -> None:
-        """Look no more; the camera stays open."""
-
-
-def bend_of(tracking: Tracking, sighting: Sighting, bends: Array) -> float:
-    """Bend [rad] of a sighting in its camera's plane, by what is known of the bends (P,) of all.
-
-    A bend in the other plane turns the marker in the picture; of one camera the angle is as it is.
-    """
-    theta = sighting.theta
-    for plane, other in enumerate(bends.tolist()):
-        if plane != sighting.plane:
-            theta = tracking.bend(sighting, other)
-    return theta
-
-
 class InlineTracking:
     """Looks when asked: in virtual time, where looking takes none. `now` is the clock of the camera's times."""
 
     pace: CameraPaces | None = None
+    """Counts looks in words of its own; None: pictures are."""
     apart = 0.0
+    """Seconds between two usable sightings that a reading is waited for, beyond what it is for any."""
 
     def __init__(
         self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
@@ -123,53 +88,50 @@ class InlineTracking:
     ) -> None:  # fmt: skip
         self._camera, self._tracker, self._keep, self._now = camera, tracker, keep, now
         self._truth = CameraTruth(noisy)
-        self.frame: Frame | None = None
-        """The newest."""
         self.zero: tuple[float, ...] = (0.0,)
+        """Marker angle of the straight wrist [rad] as the camera sees it, taken off its every angle."""
 
     def look(self) -> list[Sighting]:
-        """The newest frame's sighting, if there is one."""
-        frame = self._camera.newest()
-        if frame is None:
-            return []
+        """The newest frame's sighting, if there is one; never waits for a frame."""
+        seen = self._newest()
+        return [] if seen is None else [self._told(*seen)]
+
+    def _newest(self) -> tuple[Frame, Sighting] | None:
+        if (frame := self._camera.newest()) is None:
+            return None
         came = self._now()
-        sighting = self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
-        self.frame, sighting = frame, sighting._replace(theta=sighting.theta - self.zero[0])
+        return frame, self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
+
+    def _told(self, frame: Frame, sighting: Sighting) -> Sighting:
+        """A sighting by its angle from zero, kept with its frame."""
+        sighting = sighting._replace(theta=sighting.theta - self.zero[0])
         if self._keep is not None:
             self._keep(frame, sighting)
-        return [sighting]
+        return sighting
 
     def bend(self, sighting: Sighting, other: float) -> float:
-        """As `Tracking.bend`."""
-        return self.bend_with_zero(sighting, other, self.zero[0])
-
-    def bend_with_zero(self, sighting: Sighting, other: float, zero: float) -> float:
-        """The same where this zero has been taken off the sighting's angle [rad]."""
-        return bend_seen(sighting, self._tracker.view, other, zero, self._tracker.side)
+        """Bend about the sighting's plane [rad] of a wrist in two planes, where that about the other one is `other`."""
+        return bend_seen(sighting, self._tracker.view, other, self.zero[0], self._tracker.side)
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
-        """The frames to come are seen so; the marker's zero is to be read anew."""
+        """As `Tracker.stand_square`: the frames to come are seen so, and the marker's zero is to be read anew."""
         return self._tracker.stand_square(sightings)
 
     def close(self) -> None:
-        """Nothing goes on between looks."""
+        """Look no more; the camera stays open."""
 
 
-class ThreadedTracking:
+class ThreadedTracking(InlineTracking):
     """Looks in a thread of its own, so that the loop waits neither for the camera nor for the tracker.
 
     A frame is kept once the loop can have its angle: drawing and encoding it takes milliseconds.
     """
 
-    pace: CameraPaces | None = None
-    apart = 0.0
-
     def __init__(
         self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
         noisy: bool = True,
     ) -> None:  # fmt: skip
-        self._inner, self._keep = InlineTracking(camera, tracker, now=now, noisy=noisy), keep
-        self.zero: tuple[float, ...] = (0.0,)
+        super().__init__(camera, tracker, keep, now, noisy)
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None
         self._stop = threading.Event()
@@ -177,21 +139,13 @@ class ThreadedTracking:
         self._thread.start()
 
     def look(self) -> list[Sighting]:
-        """Sightings since the last look. Raises the error that ended the thread."""
+        """Sightings since the last look, oldest first. Raises the error that ended the thread."""
         if self._error is not None:
             raise self._error
         sightings = []
         while self._seen:
             sightings.append(self._seen.popleft())
         return [sighting._replace(theta=sighting.theta - self.zero[0]) for sighting in sightings]
-
-    def bend(self, sighting: Sighting, other: float) -> float:
-        """As `Tracking.bend`."""
-        return self._inner.bend_with_zero(sighting, other, self.zero[0])
-
-    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
-        """The frames to come are seen so; the marker's zero is to be read anew."""
-        return self._inner.stand_square(sightings)
 
     def close(self) -> None:
         """Stop looking."""
@@ -202,12 +156,11 @@ class ThreadedTracking:
         try:
             beside_the_loop()
             while not self._stop.is_set():
-                if sightings := self._inner.look():
-                    self._seen.extend(sightings)
-                    if self._keep is not None and self._inner.frame is not None:
-                        self._keep(self._inner.frame, sightings[0]._replace(theta=sightings[0].theta - self.zero[0]))
-                else:
+                if (seen := self._newest()) is None:
                     time.sleep(1e-3)
+                    continue
+                self._seen.append(seen[1])
+                self._told(*seen)
         except BaseException as error:  # handed to the loop, which stops the motors
             self._error = error
 
@@ -218,7 +171,7 @@ class PairedTracking:
     pace: CameraPaces | None = None
     apart = 0.0
 
-    def __init__(self, trackings: Sequence[InlineTracking | ThreadedTracking]) -> None:
+    def __init__(self, trackings: Sequence[InlineTracking]) -> None:
         self._trackings = tuple(trackings)
 
     @property
@@ -243,7 +196,7 @@ class PairedTracking:
         return sorted(sightings, key=lambda sighting: sighting.time)
 
     def bend(self, sighting: Sighting, other: float) -> float:
-        """As `Tracking.bend`."""
+        """As `InlineTracking.bend`."""
         return self._trackings[sighting.plane].bend(sighting, other)
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
@@ -257,3 +210,19 @@ class PairedTracking:
         """Stop looking."""
         for tracking in self._trackings:
             tracking.close()
+
+
+Tracking = InlineTracking | PairedTracking | RigTracking
+"""Gives sightings to the loop, of one camera, of both, or of a rig's looks."""
+
+
+def bend_of(tracking: Tracking, sighting: Sighting, bends: Array) -> float:
+    """Bend [rad] of a sighting in its camera's plane, by what is known of the bends (P,) of all.
+
+    A bend in the other plane turns the marker in the picture; of one camera the angle is as it is.
+    """
+    theta = sighting.theta
+    for plane, other in enumerate(bends.tolist()):
+        if plane != sighting.plane:
+            theta = tracking.bend(sighting, other)
+    return theta

@@ -29,8 +29,8 @@ from wristctl.simulation.trajectory import Trajectory, size_of
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.log import column_of
 from wristctl.trial.motions import motion_of
-from wristctl.trial.rig_belief import PLANES, layout_of_axes, layout_of_rig, names_of_planes, places_of_tendons
-from wristctl.trial.rig_settings import share_of_pair, sides_of
+from wristctl.trial.rig_belief import PLANES, layout_of_rig, names_of_planes, places_of_tendons
+from wristctl.trial.rig_settings import as_modelled, share_of_pair
 from wristctl.trial.trials import Trial
 from wristctl.wrist.kinematics import Inverse
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
@@ -62,8 +62,6 @@ FURTHER: Mapping[str, tuple[str, str]] = {
 ELLIPSE = tuple(f"error_{name}" for name in ErrorEllipse._fields)
 # File of a run that has the live reference as it was followed.
 RECORD = "data/reference.csv"
-# Share of the largest bend within which an error is small.
-_BAND = 0.02
 # Seconds before the push over which the load is taken as quiet.
 _BEFORE = 0.5
 # Seconds by which a person may push too early.
@@ -282,7 +280,7 @@ def in_pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[
     share = share_of_pair(layout, 1)
     motors = loop.actuator.model_copy(update={"tendon_stiffness": share * loop.actuator.tendon_stiffness})
     tensions = {"pretension": share * wrist.pretension, "tension_limit": share * wrist.tension_limit}
-    return sides_of(wrist, layout).model_copy(update=tensions), loop.model_copy(update={"actuator": motors})
+    return as_modelled(wrist, layout, 1).model_copy(update=tensions), loop.model_copy(update={"actuator": motors})
 
 
 def twin(
@@ -308,7 +306,6 @@ def twin(
         wrist, asked, followed = asked_of(simulated, settings.control_period, network)
         scenario = scenario_of(chosen.reference, chosen.direction)
     elif layout is None:
-        layout_of_axes(wrist)
         wrist = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not wound
     gains = np.array([gains_of(law, row.gains, tuned)])
     (repeated,) = repeat(law, gains, [followed], np.zeros(1, np.int64), asked, wrist, [scenario], Draws(study.seed))

@@ -1,21 +1,15 @@
 """The trials of an experiment: their order, their motions, what the log shows of them, and each in simulation."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.plant import Disturbances, Push
+from wristctl.config.plant import Disturbances
 from wristctl.simulation.motion import Motion
 from wristctl.trial.motions import has_path
 from wristctl.wrist.directions import DIRECTIONS
-
-if TYPE_CHECKING:
-    pass
-
 
 # Bend [rad] below which a push has nothing to be against.
 _STRAIGHT = math.radians(1.0)
@@ -43,17 +37,14 @@ class Trial(NamedTuple):
         """The bending plane; empty where it is no direction of one plane."""
         return DIRECTIONS[self.direction].plane if self.direction in DIRECTIONS else ""
 
-    def pushed(self, push: Push) -> Push:
-        """The push of an experiment as it acts in this trial, on a bench and in simulation: against the bend."""
-        return push.model_copy(update={"force": -DIRECTIONS[self.direction].sign * self.push})
-
     def disturbances(self, settings: HwRunSettings, followed: Motion) -> Disturbances:
         """What disturbs this trial: in one plane its push against the bend, in two toward `push_toward_deg`.
 
         Without that it is against the bend that is wanted where the push begins.
         """
         if followed.planes == 1:
-            return Disturbances(push=self.pushed(settings.push))
+            force = -DIRECTIONS[self.direction].sign * self.push
+            return Disturbances(push=settings.push.model_copy(update={"force": force}))
         toward = settings.push_toward_deg
         if toward is None:
             bend = [np.interp(settings.push.start, followed.time, plane) for plane in followed.bend_ref.T]

@@ -5,7 +5,7 @@ Both give datagrams as the socket has them, each with its sender, and nothing wh
 
 import json
 import socket
-from typing import Any, Protocol
+from typing import Any
 
 from wristctl.errors import UserError
 
@@ -19,30 +19,8 @@ _PATIENCE, _WAITING = 3.0, 1
 _QUIET = "[log]\nlevel = -2\n"
 
 
-class Wanted(Protocol):
-    """A source of wanted bends."""
-
-    address: str
-    """HOST:PORT, or the stream's name."""
-    words: str
-    """Address in words."""
-    guarded: bool
-    """Whether no other computer can be its sender."""
-
-    def received(self) -> tuple[bytes, Any] | None:
-        """The next datagram with its sender; None where none is waiting."""
-
-    def close(self) -> None:
-        """Give it back."""
-
-
-def source_of(listen: str) -> Wanted:
-    """The source that a setting names, HOST:PORT or lsl:NAME. Raises UserError where it cannot be listened to."""
-    return LslStream(listen.removeprefix(STREAM)) if listen.startswith(STREAM) else Datagrams(listen)
-
-
 class Datagrams:
-    """A UDP socket at HOST:PORT."""
+    """A UDP socket at HOST:PORT: its address, also in words, and whether no other computer can be its sender."""
 
     def __init__(self, listen: str) -> None:
         host, _, port = listen.rpartition(":")
@@ -60,14 +38,14 @@ class Datagrams:
         self.words, self.guarded = f"{self.address} (UDP)", bound.startswith(("127.", "::1"))
 
     def received(self) -> tuple[bytes, Any] | None:
-        """As Wanted has it."""
+        """The next datagram with its sender; None where none is waiting."""
         try:
             return self._socket.recvfrom(LONGEST + 1)
         except OSError:  # nothing more has come
             return None
 
     def close(self) -> None:
-        """As Wanted has it."""
+        """Give it back."""
         self._socket.close()
 
 
@@ -106,7 +84,7 @@ class LslStream:
         self._lost = LostError
 
     def received(self) -> tuple[bytes, Any] | None:
-        """As Wanted has it; none of a stream that has ended."""
+        """As of a socket; none of a stream that has ended."""
         try:
             sample, time = self._inlet.pull_sample(0.0)
         except self._lost:
@@ -116,5 +94,10 @@ class LslStream:
         return json.dumps({"bend": sample if len(sample) > 1 else sample[0], "t": time}).encode(), self.address
 
     def close(self) -> None:
-        """As Wanted has it."""
+        """Give it back."""
         self._inlet.close_stream()
+
+
+def source_of(listen: str) -> Datagrams | LslStream:
+    """The source that a setting names, HOST:PORT or lsl:NAME. Raises UserError where it cannot be listened to."""
+    return LslStream(listen.removeprefix(STREAM)) if listen.startswith(STREAM) else Datagrams(listen)

@@ -15,9 +15,8 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_between
+from wristctl.trial.camera_record import CameraRecord, Frame, MarkerLag, Recent, jump_between
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
-from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
 from wristctl.trial.rig_belief import TOWARD, names_of_planes, numbers_of, pull_directions, unit_toward
 from wristctl.trial.rig_words import words_of_board, words_of_rig
@@ -89,14 +88,8 @@ class Watch:
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
-        self._blind = BlindModel(
-            wrist,
-            settings.actuator,
-            settings.safety.softest,
-            self._period,
-            planes,
-            layout,
-        )
+        softest = settings.safety.softest
+        self._blind = BlindModel(wrist, settings.actuator, softest, self._period, planes, layout)
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
@@ -143,6 +136,7 @@ class Watch:
     def see(self, tick: Tick, last_usable: float) -> dict[str, float]:
         """All residuals of a tick; nan where one is not known yet."""
         self._began = tick.clock if self._began is None else self._began
+        since, one = tick.clock - self._began, len(self._cameras) == 1
         self._count(tick)
         finite = bool(np.isfinite(np.hstack(tick.estimate)).all())
         heard = tick.unheard < _UNHEARD * self._period  # else the wrist goes on, and nobody knows where spools stand
@@ -158,10 +152,10 @@ class Watch:
             "tension_ratio": self._tension_ratio(tick) if finite else math.nan,
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
-            "doubted": self._doubted(tick.clock),
+            "doubted": self._cameras[0].doubted(tick.clock, since) if one else math.nan,
             **self._following(tick),
             **self._of_timing(tick.clock),
-            "unseen": max(self._unseen(camera, tick.clock) for camera in self._cameras),
+            "unseen": max(each.unseen(tick.clock, since, self._settings.sensor) for each in self._cameras),
             "repeated": float(max(camera.repeated(tick.clock) for camera in self._cameras)),
             "resent": sum(self._resent.values(tick.clock)),
             "moved": max(camera.moved for camera in self._cameras),
@@ -177,7 +171,6 @@ class Watch:
             raise self._stop(beyond, tick)
 
     def _pull(self, position: Array, taut: Array) -> float:
-        """Largest tension that spools make [N]."""
         return max(0.0, float(self._spools.tension(position, taut).max()))
 
     def _weighed(self, clock: float, position: Array, taut: Array) -> dict[str, float]:
@@ -237,14 +230,6 @@ class Watch:
         if self._began is None or clock - self._began < _TICKS or not trips:
             return {"round_trip": math.nan, "skipped": math.nan}
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
-
-    def _doubted(self, clock: float) -> float:
-        since = clock - (clock if self._began is None else self._began)
-        return self._cameras[0].doubted(clock, since) if len(self._cameras) == 1 else math.nan
-
-    def _unseen(self, camera: CameraRecord, clock: float) -> float:
-        since = clock - (clock if self._began is None else self._began)
-        return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
         name = limit.name

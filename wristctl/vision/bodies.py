@@ -5,13 +5,13 @@ it.
 """
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.vision.scene_parts import Stroke, bent_across, last_disc, moving, moving_in_space, with_last_disc
+from wristctl.vision.scene_parts import Stroke, bent_across, flat, moving, with_last_disc
 from wristctl.wrist.kinematics import Backbone
 
 # Points (m, 3) [m] moved to where they are.
@@ -31,28 +31,36 @@ class Disc(NamedTuple):
     """Of the fingers that hold it."""
 
 
-class Body(Protocol):
+class Body:
     """A wrist with its hand; `across` is a bend away from the camera [rad] beside its coordinates q."""
 
+    def __init__(self, wrist: WristParameters, end: float, edge_on: bool) -> None:
+        self._wrist, self._end, self._edge_on = wrist, end, edge_on
+
     def strokes(self, q: Array) -> list[Stroke]:
-        """Everything that moves."""
+        """Everything that moves, without the bend across."""
+        line, _ = self._frames(q, np.linspace(0.0, self._end, 24))
+        return moving(line, self._frames(q, np.linspace(0.0, self._end, self._wrist.discs)), self._wrist, self._edge_on)
 
     def carry(self, across: float) -> Carry:
-        """What the bend across does to its strokes."""
+        """What the bend across does to the strokes: nothing, where the coordinates have both bends."""
+        return lambda points: points
 
     def disc(self, q: Array, across: float) -> Disc:
         """The last disc."""
+        raise NotImplementedError
+
+    def _frames(self, q: Array, places: Array) -> tuple[Array, Array]:
+        """Centres (m, 3) [m] and rotations (m, 3, 3) of cross-sections at places (m,) from 0 to the end."""
+        raise NotImplementedError
 
 
-class PlanarBody:
+class PlanarBody(Body):
     """The wrist of a plant in one plane, bent across by a constant curvature."""
 
     def __init__(self, backbone: Backbone, wrist: WristParameters) -> None:
-        self._backbone, self._wrist = backbone, wrist
-
-    def strokes(self, q: Array) -> list[Stroke]:
-        """Everything that moves, in the plane."""
-        return moving(self._backbone, q, self._wrist)
+        super().__init__(wrist, wrist.length, edge_on=False)
+        self._backbone = backbone
 
     def carry(self, across: float) -> Carry:
         """By the bend across."""
@@ -60,11 +68,19 @@ class PlanarBody:
 
     def disc(self, q: Array, across: float) -> Disc:
         """The last disc in the plane, carried by the bend across."""
-        place, length = last_disc(self._backbone, q, self._wrist), self._wrist.length
+        (centre,), (normal,) = self._backbone(self._wrist, q, np.array([self._end]))
+        place, length = (complex(centre), complex(normal)), self._wrist.length
         return Disc(*place, lambda points: with_last_disc(points, across, length, place), self.carry(across))
 
+    def _frames(self, q: Array, places: Array) -> tuple[Array, Array]:
+        centres, normals = self._backbone(self._wrist, q, places)
+        turned = np.zeros((len(places), 3, 3))
+        turned[:, 0, 0] = turned[:, 1, 1] = normals.real
+        turned[:, 1, 0], turned[:, 0, 1], turned[:, 2, 2] = normals.imag, -normals.imag, 1.0
+        return flat(centres, 0.0), turned
 
-class SpatialBody:
+
+class SpatialBody(Body):
     """The wrist of a plant in two planes, before the camera that looks at one of them.
 
     `side` is 1 where that camera sees its plane's + side on the right. Tangent, ulnar and flexion are right-handed: the
@@ -72,19 +88,10 @@ class SpatialBody:
     """
 
     def __init__(self, frames: Frames, wrist: WristParameters, plane: Literal[0, 1], side: float) -> None:
-        self._frames_of, self._wrist, self._edge_on = frames, wrist, plane == 1
+        super().__init__(wrist, 1.0, edge_on=plane == 1)
+        self._frames_of = frames
         own, away = ([0.0, 1.0, 0.0], [0.0, 0.0, side]) if plane == 0 else ([0.0, 0.0, 1.0], [0.0, -side, 0.0])
         self._axes = np.array([[1.0, 0.0, 0.0], own, away])
-
-    def strokes(self, q: Array) -> list[Stroke]:
-        """Everything that moves."""
-        line, _ = self._frames(q, np.linspace(0.0, 1.0, 24))
-        frames = self._frames(q, np.linspace(0.0, 1.0, self._wrist.discs))
-        return moving_in_space(line, frames, self._wrist, self._edge_on)
-
-    def carry(self, across: float) -> Carry:
-        """Nothing: coordinates have both bends."""
-        return lambda points: points
 
     def disc(self, q: Array, across: float) -> Disc:
         """The last disc, carried from where a straight wrist of no length would have it."""
@@ -96,7 +103,6 @@ class SpatialBody:
 
         return Disc(0j, 1.0 + 0j, placed, placed)
 
-    def _frames(self, q: Array, shares: Array) -> tuple[Array, Array]:
-        """Centres (m, 3) [m] and rotations (m, 3, 3) of cross-sections at shares (m,) of the length."""
-        centres, frames = self._frames_of(self._wrist, q, shares)
+    def _frames(self, q: Array, places: Array) -> tuple[Array, Array]:
+        centres, frames = self._frames_of(self._wrist, q, places)
         return centres @ self._axes.T, self._axes @ frames @ self._axes.T

@@ -146,7 +146,6 @@ def grey_of(picture: NDArray[Any]) -> Image:
 
 
 def _by_number(file: Path) -> list[tuple[int, str]]:
-    """frame2 before frame10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)]
 
 

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from wristctl.arrays import Array
 from wristctl.config.camera import Markers
-from wristctl.vision.view import View
+from wristctl.vision.view import View, turn
 
 # Corners of a square of side 1, in the order of a marker's: right is real, down imaginary.
 _SQUARE = 0.5 * np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
@@ -95,8 +95,5 @@ def _off_squares(rays: Array, x: Array) -> tuple[NDArray[np.complex128], float]:
 
 def _turned(tilt: float, pan: float) -> Array:
     """Rotation (3, 3) from the plane's axes (right, down, away) to the camera's."""
-    (cos_t, sin_t), (cos_p, sin_p) = ((math.cos(angle), math.sin(angle)) for angle in (tilt, pan))
-    about_horizontal = np.array([[1.0, 0.0, 0.0], [0.0, cos_t, -sin_t], [0.0, sin_t, cos_t]])
-    about_vertical = np.array([[cos_p, 0.0, sin_p], [0.0, 1.0, 0.0], [-sin_p, 0.0, cos_p]])
-    turned: Array = about_horizontal @ about_vertical
+    turned: Array = turn(0, tilt) @ turn(1, pan)
     return turned

@@ -39,10 +39,7 @@ def _lines(image: NDArray[Any], vertices: NDArray[np.complex128], margin: float)
     out, reach = -1j * side / np.abs(side), margin * length
     along = np.linspace(margin, 1.0 - margin, min(_PLACES, max(8, round(length))))
     across = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / _FINE)) + 1)
-    places = (vertices[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
-    flat = places.reshape(-1, len(across)).astype(np.complex64)
-    grey = cv2.remap(image, flat.real, flat.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    rise = np.diff(grey.reshape(places.shape).astype(float), axis=2).clip(0.0)
+    rise = np.diff(_greys(image, vertices, along, across), axis=2).clip(0.0)
     weight = rise.sum(axis=2) + 1e-9
     edge = rise @ (0.5 * (across[1:] + across[:-1])) / weight
     middle, off = (np.average(np.broadcast_to(values, edge.shape), 1, weight)[:, None] for values in (along, edge))
@@ -51,8 +48,17 @@ def _lines(image: NDArray[Any], vertices: NDArray[np.complex128], margin: float)
     return vertices + side * middle[:, 0] + out * off[:, 0], side + out * slope
 
 
+def _greys(image: NDArray[Any], vertices: NDArray[np.complex128], along: Array, across: Array) -> Array:
+    """Grey levels (4, a, b) at shares (a,) along each side of a square, so far (b,) [px] out of it."""
+    side = np.roll(vertices, -1) - vertices
+    out = -1j * side / np.abs(side)
+    places = (vertices[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
+    flat = places.reshape(-1, len(across)).astype(np.complex64)
+    grey = cv2.remap(image, flat.real, flat.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return grey.reshape(places.shape).astype(float)
+
+
 def _meeting(point: NDArray[np.complex128], along: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Intersections of consecutive lines."""
     before, ahead = np.roll(point, 1), np.roll(along, 1)
     share = ((point - before).conj() * along).imag / (ahead.conj() * along).imag
     met: NDArray[np.complex128] = before + share * ahead
@@ -191,19 +197,13 @@ def quality_of(image: Image, corners: Array) -> PictureQuality:
     side = float(np.hypot(*edges(corners).T).mean())
     reach = 0.5 * side / CELLS
     across = np.arange(-reach, reach + _EDGE_FINE, _EDGE_FINE)
-    vertices = corners[:, 0] + 1j * corners[:, 1]
-    along = np.roll(vertices, -1) - vertices
-    out = -1j * along / np.abs(along)
-    places = vertices[:, None] + along[:, None] * np.linspace(0.15, 0.85, _EDGE_PLACES)
-    points = (places[..., None] + across * out[:, None, None]).reshape(-1, len(across)).astype(np.complex64)
-    grey = cv2.remap(image, points.real, points.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    profile = grey.reshape(4, _EDGE_PLACES, -1).astype(float).mean(axis=1)
+    along = np.linspace(0.15, 0.85, _EDGE_PLACES)
+    profile = _greys(image, corners[:, 0] + 1j * corners[:, 1], along, across).mean(axis=1)
     return PictureQuality(side, float(np.median([_width(rise) for rise in profile])),
                           float(np.median(profile[:, :3])), float(np.median(profile[:, -3:])))  # fmt: skip
 
 
 def _width(profile: Array) -> float:
-    """Standard deviation [px] of a rise, about its middle."""
     rise = np.diff(profile).clip(0.0)
     distance = _EDGE_FINE * np.arange(len(rise))
     total = rise.sum() + 1e-9

@@ -6,7 +6,7 @@ import threading
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 
@@ -42,13 +42,6 @@ class Refusal(NamedTuple):
     explicit: bool
 
 
-class Properties(Protocol):
-    """Source of a device's properties: cv2.VideoCapture."""
-
-    def get(self, name: int, /) -> float:
-        """The present value."""
-
-
 def asked_for(device: Device) -> list[Asked]:
     """In the order in which a device must hear it: the format decides which sizes and rates there are."""
     code = None if device.fourcc is None else float(cv2.VideoWriter.fourcc(*device.fourcc))
@@ -74,7 +67,7 @@ def asked_for(device: Device) -> list[Asked]:
     return requests + [Asked(setting, name, float(value)) for setting, name, value in values if value is not None]
 
 
-def refused(wanted: list[Asked], capture: Properties, source: str, device: Device) -> list[Refusal]:
+def refused(wanted: list[Asked], capture: cv2.VideoCapture, source: str, device: Device) -> list[Refusal]:
     """Settings that the device has refused, its power line's frequency included, which is requested here."""
     refusals = []
     for request in wanted:

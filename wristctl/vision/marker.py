@@ -82,8 +82,6 @@ class Sighting(NamedTuple):
 
 
 class _Base(NamedTuple):
-    """The clamped marker, averaged."""
-
     corners: Array  # (4, 2) rectified
     frames: int
     seen: float
@@ -277,16 +275,13 @@ def _ahead(base: Array, tip: Array) -> bool:
 
 
 def _width(corners: Array) -> float:
-    """Mean length of the top and the bottom edge."""
     return 0.5 * (math.dist(corners[0], corners[1]) + math.dist(corners[3], corners[2]))
 
 
 def _side(corners: Array) -> float:
-    """Mean length of all four edges."""
     return float(np.hypot(*edges(corners).T).mean())
 
 
 def _grey(image: Image, corners: Array) -> float:
-    """Mean grey level of the upright rectangle around a marker."""
     low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int)
     return float(image[max(0, low[1]) : high[1], max(0, low[0]) : high[0]].mean())

@@ -42,23 +42,23 @@ class Video:
             self._writer.release()
 
 
-class RawVideo:
+class RawVideo(Video):
     """`file` with the pictures as they came, and a table of the same name with their times."""
 
     def __init__(self, file: Path, frame_rate: float) -> None:
-        self._video = Video(file, frame_rate)
+        super().__init__(file, frame_rate)
         self._table = file.with_suffix(".csv").open("w", encoding="utf-8", buffering=1)
         self._table.write(",".join(COLUMNS) + "\n")
 
     def add(self, frame: Frame, sighting: Sighting) -> None:
         """The next frame, whatever was seen in it."""
         picture: Any = cv2.cvtColor(frame.image, cv2.COLOR_GRAY2BGR)
-        self._video.write(picture)
+        self.write(picture)
         self._table.write(f"{frame.number},{frame.time!r}\n")
 
     def close(self) -> None:
         """Finish both files."""
-        self._video.close()
+        super().close()
         self._table.close()
 
 
@@ -124,19 +124,12 @@ class Picked:
         return [pictures[number] for number in sorted(pictures)]
 
 
-class AnnotatedVideo:
+class AnnotatedVideo(Video):
     """An annotated video."""
-
-    def __init__(self, file: Path, frame_rate: float) -> None:
-        self._video = Video(file, frame_rate)
 
     def add(self, frame: Frame, sighting: Sighting) -> None:
         """The next frame, annotated."""
-        self._video.write(annotate(frame.image, sighting))
-
-    def close(self) -> None:
-        """Finish the file."""
-        self._video.close()
+        self.write(annotate(frame.image, sighting))
 
 
 def angle_noise(angles: Array) -> float:

@@ -79,7 +79,6 @@ class Scene:
         return self._film.expose(total, len(instants), rng)
 
     def _printed(self, number: int) -> Image:
-        """A marker as ink on paper."""
         grey = 128 + self._settings.contrast * (print_of(number).astype(float) - 128)
         return np.rint(grey).astype(np.uint8).repeat(_CELL, axis=0).repeat(_CELL, axis=1)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.kinematics import Backbone, Planar, discs, offset_points
+from wristctl.wrist.kinematics import Planar
 
 _FINGERTIPS = ((1.7, -0.35), (1.82, -0.12), (1.75, 0.12), (1.5, 0.35))
 
@@ -73,7 +73,7 @@ def clamp() -> list[Stroke]:
     body = _box((_CLAMP_FOOT, -0.5 * THICK), (-_CLAMP_HALF, _CLAMP_HALF), (-_CLAMP_DEPTH, _CLAMP_DEPTH))
     front = body[[0, 2, 6, 4]]
     places = [complex(x, y) for x in (-0.041, -0.009) for y in (-0.029, 0.029)]
-    screws = [_flat(place + 0.0035 * np.exp(1j * _AROUND), -_CLAMP_DEPTH) for place in places]
+    screws = [flat(place + 0.0035 * np.exp(1j * _AROUND), -_CLAMP_DEPTH) for place in places]
     return [
         Stroke(table, 84, "hull"),
         Stroke(body, 58, "hull"),
@@ -82,41 +82,24 @@ def clamp() -> list[Stroke]:
     ]
 
 
-def moving(backbone: Backbone, q: Array, wrist: WristParameters) -> list[Stroke]:
-    """The wrist at its plant's coordinates (q,), and its hand."""
-    frames = discs(backbone, q, wrist)
-    centres, normals = frames
-    c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
-    parts = [
-        Stroke(_flat(centres[-1] + normals[-1] * outline, 0.0), 164, "hull")
-        for outline in _hand(max(wrist.hand_offset, 0.02))
-    ]
-    line, _ = backbone(wrist, q, np.linspace(0.0, wrist.length, 24))
-    parts += _pairs(frames, c, behind=True)
-    parts.append(Stroke(_flat(line, 0.0), 92, "line", 4))
-    for centre, normal in zip(*frames, strict=True):
-        rims = [_rim(centre + normal * end * THICK, normal, radius) for end in (-0.5, 0.5)]
-        parts.append(Stroke(np.concatenate(rims), 150, "hull"))
-        parts += [Stroke(rims[0], 118, "face"), Stroke(rims[1][::-1], FACE, "face")]
-    return parts + _pairs(frames, c, behind=False)
-
-
-def moving_in_space(line: Array, frames: tuple[Array, Array], wrist: WristParameters, edge_on: bool) -> list[Stroke]:
-    """The wrist in two planes, and its hand, seen on the palm or `edge_on`.
+def moving(line: Array, frames: tuple[Array, Array], wrist: WristParameters, edge_on: bool) -> list[Stroke]:
+    """The wrist and its hand, seen on the palm or `edge_on`.
 
     `line` (m, 3) is its backbone [m], `frames` are centres (discs, 3) [m] and rotations (discs, 3, 3) of its discs.
     """
     centres, turned = frames
     c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
-    outlines = hand(max(wrist.hand_offset, 0.02), edge_on=True) if edge_on else _hand(max(wrist.hand_offset, 0.02))
-    parts = [Stroke(centres[-1] + _flat(outline, 0.0) @ turned[-1].T, 164, "hull") for outline in outlines]
-    parts += _pairs_in_space(centres, turned, c, behind=True)
+    parts = [
+        Stroke(centres[-1] + flat(outline, 0.0) @ turned[-1].T, 164, "hull")
+        for outline in _hand(max(wrist.hand_offset, 0.02), edge_on)
+    ]
+    parts += _pairs(centres, turned, c, behind=True)
     parts.append(Stroke(line, 92, "line", 4))
     for centre, frame in zip(centres, turned, strict=True):
-        rims = [centre + _rim(complex(end * THICK), 1.0 + 0j, radius) @ frame.T for end in (-0.5, 0.5)]
+        rims = [centre + _rim(end * THICK, radius) @ frame.T for end in (-0.5, 0.5)]
         parts.append(Stroke(np.concatenate(rims), 150, "hull"))
         parts += [Stroke(rims[0], 118, "face"), Stroke(rims[1][::-1], FACE, "face")]
-    return parts + _pairs_in_space(centres, turned, c, behind=False)
+    return parts + _pairs(centres, turned, c, behind=False)
 
 
 def bent_across(points: Array, bend: float, length: float) -> Array:
@@ -152,7 +135,6 @@ def with_last_disc(points: Array, bend: float, length: float, disc: tuple[comple
 
 
 def _turned(theta: float, bend: float) -> Array:
-    """The rotation (3, 3) from the first disc to the last."""
     return np.asarray(cv2.Rodrigues(np.array([0.0, -bend, theta]))[0])
 
 
@@ -165,34 +147,16 @@ def _arc_end(theta: float, bend: float) -> Array:
 
 def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:
     """Two fingers of somebody who holds the last disc, over its marker."""
-    return [Stroke(_flat(tip + along * capsule(*ends, 0.0085), depth), 172, "hull") for ends in _FINGERS]
+    return [Stroke(flat(tip + along * capsule(*ends, 0.0085), depth), 172, "hull") for ends in _FINGERS]
 
 
-def last_disc(backbone: Backbone, q: Array, wrist: WristParameters) -> tuple[complex, complex]:
-    """Centre [m] of the last disc and its unit normal."""
-    centres, normals = discs(backbone, q, wrist)
-    return complex(centres[-1]), complex(normals[-1])
-
-
-def _pairs(frames: tuple[Planar, Planar], c: float, behind: bool) -> list[Stroke]:
+def _pairs(centres: Array, turned: Array, c: float, behind: bool) -> list[Stroke]:
     """On either side the tendon and the springs around it, behind the backbone or in front of it."""
     parts = []
     for offset in (-c, c):
-        tendon = offset_points(frames, offset)
-        depth = c if behind else -c
-        springs = coil(tendon[:-1, None], tendon[1:, None], 0.17 * c, turns=3)[:, ::2].ravel()
-        parts.append(Stroke(_flat(springs, depth), 140 if behind else 158, "line"))
-        parts.append(Stroke(_flat(tendon, depth), 62 if behind else 40, "line", 2))
-    return parts
-
-
-def _pairs_in_space(centres: Array, turned: Array, c: float, behind: bool) -> list[Stroke]:
-    """The same of a wrist in two planes."""
-    parts = []
-    for offset in (-c, c):
         tendon = centres + turned @ np.array([0.0, offset, c if behind else -c])
-        flat = tendon[:, 0] + 1j * tendon[:, 1]
-        springs = coil(flat[:-1, None], flat[1:, None], 0.17 * c, turns=3)[:, ::2]
+        beside = tendon[:, 0] + 1j * tendon[:, 1]
+        springs = coil(beside[:-1, None], beside[1:, None], 0.17 * c, turns=3)[:, ::2]
         depth = np.linspace(tendon[:-1, 2], tendon[1:, 2], springs.shape[1], axis=-1)
         wound = np.stack([springs.real, springs.imag, depth], axis=-1).reshape(-1, 3)
         parts.append(Stroke(wound, 140 if behind else 158, "line"))
@@ -201,17 +165,17 @@ def _pairs_in_space(centres: Array, turned: Array, c: float, behind: bool) -> li
 
 
 @cache
-def _hand(size: float) -> list[Planar]:
-    """From back to front, as the palm is over the roots of the fingers."""
-    return hand(size, edge_on=False)[::-1]
+def _hand(size: float, edge_on: bool) -> list[Planar]:
+    """From back to front: as the palm is over the roots of the fingers."""
+    return hand(size, edge_on)[:: 1 if edge_on else -1]
 
 
-def _rim(centre: complex, normal: complex, radius: float) -> Array:
-    places = centre + 1j * normal * radius * np.cos(_AROUND)
-    return np.stack([places.real, places.imag, radius * np.sin(_AROUND)], axis=-1)
+def _rim(at: float, radius: float) -> Array:
+    return np.stack([np.full(len(_AROUND), at), radius * np.cos(_AROUND), radius * np.sin(_AROUND)], axis=-1)
 
 
-def _flat(places: Planar, depth: float) -> Array:
+def flat(places: Planar, depth: float) -> Array:
+    """Points (m, 3) at these places (m,) of the plane x + i y, in this depth [m]."""
     return np.stack([places.real, places.imag, np.full(len(places), depth)], axis=-1)
 
 

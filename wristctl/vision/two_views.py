@@ -82,7 +82,6 @@ def paired_bends(
 
 
 def _seen_beside(times: Array, known: Array) -> NDArray[np.bool_]:
-    """Whether there are known times before and after each, and one of them within NEAR."""
     after = np.searchsorted(known, times)
     before, at_or_after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
     near = np.minimum(np.abs(times - before), np.abs(times - at_or_after)) <= NEAR

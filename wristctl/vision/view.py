@@ -106,7 +106,7 @@ class Pinhole:
         # Rows: the camera's right, down and forward axes in the world.
         square = np.array([[0.0, self.side, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         tilt, pan, roll = (math.radians(deg) for deg in (settings.tilt_deg, settings.pan_deg, settings.roll_deg))
-        turned = _turn(2, roll) @ _turn(0, tilt) @ _turn(1, self.side * pan)
+        turned = turn(2, roll) @ turn(0, tilt) @ turn(1, self.side * pan)
         self.rotation = turned @ square
         self.translation = np.array([0.0, 0.0, settings.distance]) - self.rotation @ [settings.height_above, 0.0, 0.0]
 
@@ -132,6 +132,7 @@ class Pinhole:
         return undistorted.reshape(pixels.shape).astype(np.float64)
 
 
-def _turn(axis: int, angle: float) -> Array:
+def turn(axis: int, angle: float) -> Array:
+    """Rotation (3, 3) about an axis, 0 to 2, by an angle [rad]."""
     rotation: Array = cv2.Rodrigues(angle * np.eye(3)[axis])[0]
     return rotation

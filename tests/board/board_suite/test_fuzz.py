@@ -9,8 +9,8 @@ import pytest
 
 from tests.board.bench import MS, Bench, encode
 from wristctl.board.dictionary import STRUCT_CODE, WIRE_RANGE, load
-from wristctl.board.layout import Field
-from wristctl.board.messages import BOUND, COMMAND_OF, ENABLE_KEY, LAYOUTS, Command, Rate, State
+from wristctl.board.layout import BOUND, COMMAND_OF, LAYOUTS, Field
+from wristctl.board.messages import ENABLE_KEY, Command, Rate, State
 
 FIELD_BYTES = dict.fromkeys(Command, 0) | {c: LAYOUTS[m].struct.size for m, c in COMMAND_OF.items()}
 PAYLOAD_BYTES = {command: size + 2 * (command in BOUND) for command, size in FIELD_BYTES.items()}

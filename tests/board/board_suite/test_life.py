@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from tests.board.bench import MS, Bench
+from wristctl.board.layout import BOUND, COMMAND_OF, LAYOUTS
 from wristctl.board.messages import (
-    BOUND,
-    COMMAND_OF,
     ENABLE_KEY,
-    LAYOUTS,
     Command,
     Configure,
     Connect,

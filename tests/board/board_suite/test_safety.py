@@ -9,11 +9,11 @@ import pytest
 
 from tests.board.bench import MS, Bench
 from tests.board.conftest import IMAGE
+from wristctl.board.layout import LAYOUTS
 from wristctl.board.messages import (
     ENABLE_KEY,
     ESTOP_SEQ,
     HEARTBEAT_MS,
-    LAYOUTS,
     Command,
     Configure,
     Fault,

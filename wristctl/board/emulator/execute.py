@@ -231,7 +231,6 @@ def _rest(chip: Chip, op: int, a: int, b: int) -> int:
 
 @compiled
 def _load_program(chip: Chip, op: int, a: int) -> int:
-    """LPM and ELPM."""
     memory = chip.memory
     far = op >= Op.ELPM
     address = pair(chip, _Z) | (memory[RAMPZ] << 16 if far else 0)

@@ -10,7 +10,7 @@ import select
 import socket
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,12 +155,30 @@ def serve(
 
     `watch` is told what the chip's latches did, and when its clock was 0 (`time.monotonic`): later where it lagged.
     """
-    lateness = _Lateness()
-    with no_long_pauses():
-        try:
-            _serve(chip, line, running, watch, lateness)
-        finally:
-            lateness.tell()
+    with no_long_pauses(), _Lateness() as lateness:
+        start = time.monotonic() - chip.cycles / FREQUENCY
+        connected = False
+        while running():
+            before, connected = connected, line.wait(_QUANTUM if connected else _IDLE_QUANTUM)
+            if connected and not before:
+                chip.reset()
+            behind = time.monotonic() - start - chip.cycles / FREQUENCY
+            start += max(0.0, behind - _FURTHEST_BEHIND)
+            piece = max(0.0, min(behind, _FURTHEST_BEHIND))
+            try:
+                chip.run(round(piece * FREQUENCY))
+            except Halted as crash:
+                log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
+                chip.reset()
+            if connected and chip.bytes_coming < _ON_THE_WAY:
+                chip.write(line.receive())  # now that its clock is at the time at which they came
+            elif connected:
+                time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
+            if data := chip.read():
+                line.send(data)
+            if connected and before:
+                lateness.ran(piece, behind - piece, time.monotonic() - start - chip.cycles / FREQUENCY)
+            watch(chip.events(), start)
 
 
 class _Lateness:
@@ -176,7 +194,10 @@ class _Lateness:
         self._late += piece * (0.5 * piece + after)
         self._worst = max(self._worst, piece + given_up + after)
 
-    def tell(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """Log it, as a warning where it matters."""
         if self._served == 0.0:
             return
@@ -186,32 +207,3 @@ class _Lateness:
             log.warning("%s: this computer is too slow or too busy for what was measured on it", said)
         else:
             log.info(said)
-
-
-def _serve(
-    chip: Atmega2560, line: Line, running: Callable[[], bool], watch: Callable[[NDArray[np.void], float], None],
-    lateness: _Lateness,
-) -> None:  # fmt: skip
-    start = time.monotonic() - chip.cycles / FREQUENCY
-    connected = False
-    while running():
-        before, connected = connected, line.wait(_QUANTUM if connected else _IDLE_QUANTUM)
-        if connected and not before:
-            chip.reset()
-        behind = time.monotonic() - start - chip.cycles / FREQUENCY
-        start += max(0.0, behind - _FURTHEST_BEHIND)
-        piece = max(0.0, min(behind, _FURTHEST_BEHIND))
-        try:
-            chip.run(round(piece * FREQUENCY))
-        except Halted as crash:
-            log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
-            chip.reset()
-        if connected and chip.bytes_coming < _ON_THE_WAY:
-            chip.write(line.receive())  # now that its clock is at the time at which they came
-        elif connected:
-            time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
-        if data := chip.read():
-            line.send(data)
-        if connected and before:
-            lateness.ran(piece, behind - piece, time.monotonic() - start - chip.cycles / FREQUENCY)
-        watch(chip.events(), start)
