@@ -7,8 +7,7 @@ the tangent before it, as an arc's and as two links' with a hinge between them. 
 from typing import Any
 
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.lane import turn, zero_like
-from wristctl.lanes.rows import planes_like
+from wristctl.lanes.lane import zero_like
 from wristctl.wrist import arcs, tendons
 from wristctl.wrist.segments import Segments
 
@@ -78,15 +77,3 @@ def bend_along(segment: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
         angle = angle + q[k]
         turning = turning + rate[k]
     bend[0], speed[0] = angle, turning
-
-
-@compiled
-def tip_derivatives(segment: Any, q: Any, place: Any, angle: Any) -> None:
-    """Part k turns all that lies beyond it: d(tip)/d(theta_k) = dz_k + i (tip - end of part k)."""
-    arc = arcs.Chords(planes_like(q), planes_like(q), planes_like(q), planes_like(q))
-    chords(segment, q, arc)
-    beyond = zero_like(segment.length) * arc.z[0]
-    for k in range(len(q) - 1, -1, -1):
-        place[k] = arc.dz[k] + turn(beyond)
-        angle[k] = 1.0 + zero_like(segment.length)
-        beyond = beyond + arc.z[k]

@@ -27,7 +27,6 @@ from wristctl.wrist.chain import (
     moment_arms,
     spring,
     tendon_torques,
-    tip_derivatives,
 )
 from wristctl.wrist.dynamics import bias
 from wristctl.wrist.integrator import step
@@ -84,17 +83,6 @@ def _chords(segment: Any, theta: Any, arc: Any) -> Any:
         arc.d3z[k] = -1.0 * turn(link)
         tangent = after
     return tangent
-
-
-@compiled
-def _tip(segment: Any, theta: Any) -> Any:
-    tangent, half = planar(1.0 + zero_like(segment.length), 0.0), 0.5 * segment.length
-    position = zero_like(half) * tangent
-    for k in range(len(theta)):
-        after = tangent * _turned(theta[k])
-        position = position + half * (tangent + after)
-        tangent = after
-    return position, tangent
 
 
 @compiled
@@ -236,8 +224,6 @@ HINGES = PlantModel(
     travel=travel,
     within=_within,
     disturbed=_disturbed,
-    tip_pose=_tip,
-    tip_jacobian=tip_derivatives,
     angle=lambda q: q.sum(axis=-1),
     tips=_tips,
     taut=_taut,

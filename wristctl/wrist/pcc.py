@@ -7,8 +7,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.named_tuples import replacing
-from wristctl.wrist.arcs import ARC_LIMIT, tip
-from wristctl.wrist.chain import bend_along, tip_derivatives
+from wristctl.wrist.arcs import ARC_LIMIT
+from wristctl.wrist.chain import bend_along
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import arcs_backbone, chain_tip
@@ -31,11 +31,6 @@ def _within(plant: Any, q: Any) -> Any:
 @compiled
 def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
     return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
-
-
-@compiled
-def _tip_pose(plant: Any, q: Any) -> Any:
-    return tip(q, plant.length)
 
 
 def check_even(wrist: WristParameters, n: int) -> None:
@@ -65,8 +60,6 @@ PCC = PlantModel(
     travel=travel,
     within=_within,
     disturbed=_disturbed,
-    tip_pose=_tip_pose,
-    tip_jacobian=tip_derivatives,
     angle=lambda theta: theta.sum(axis=-1),
     tips=lambda wrist, theta: chain_tip(theta, wrist.length),
     taut=_taut,

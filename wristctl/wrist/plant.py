@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -24,11 +24,10 @@ from wristctl.config.choices import PLANTS_IN_SPACE as _IN_SPACE
 from wristctl.config.choices import Choices
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
 from wristctl.lanes.compiled import by_type, implements, kernel, spelled_out
-from wristctl.lanes.lane import dot, planar, where, zero_like
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.wrist.kinematics import Backbone
 from wristctl.wrist.tendon_mechanics import (
     WRAPPED,
@@ -75,8 +74,6 @@ class PlantModel:
     coordinates (q,) and at shares (m,) of the way from the base to the tip."""
     read: Any = None
     """Function (model, rows, pulls) of compiled code that reads the parameters; None: each is a row."""
-    tip_pose: Any = None
-    tip_jacobian: Any = None
     angle: Callable[[Array], Array] = _unknown
     """Bending angles (...) [rad] of the last disc at coordinates (..., q); in two planes its bends (..., 2)."""
     taut: Callable[[WristParameters, Array], Array] = _unknown
@@ -88,7 +85,7 @@ class PlantModel:
     where the plant cannot tell."""
 
     def __post_init__(self) -> None:
-        for function in (advance, bend_of, travel, within, disturbed, tip_pose, tip_jacobian):
+        for function in (advance, bend_of, travel, within, disturbed):
             if (body := getattr(self, function.__name__)) is not None:
                 implements(function, self.parameters)(body)
 
@@ -196,18 +193,6 @@ def disturbed(plant: Any, force: Any, scale: Any) -> Any:
 
 
 @by_type
-def tip_pose(plant: Any, q: Any) -> Any:
-    """Centre of the last disc and the unit tangent there, planar."""
-    raise NotImplementedError("compiled code only")
-
-
-@by_type
-def tip_jacobian(plant: Any, q: Any, place: Any, angle: Any) -> None:
-    """Derivatives of the last disc's centre (planar rows) and of its angle (rows) by each coordinate."""
-    raise NotImplementedError("compiled code only")
-
-
-@by_type
 def path_along(tendons: Any, plant: Any, q: Any) -> Any:
     """Path of the tendons at coordinates q, as the plant's `travel`; zeros where pulls are held, which need none."""
     raise NotImplementedError("compiled code only")
@@ -244,49 +229,6 @@ def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
 def kernel_of(function: Any, model: PlantModel) -> Any:
     """A function of Python as a kernel that moves plants of this model; its cache goes by that one's sources too."""
     return kernel(function, *model.sources)
-
-
-class Pose(NamedTuple):
-    """The last disc of a plant at coordinates (B, q)."""
-
-    tip: Array
-    """x, y [m] of its centre, (B, 2)."""
-    angle: Array
-    """(B,) [rad]"""
-    jacobian: Array
-    """Derivatives of x, y and angle by the coordinates, (B, 3, q)."""
-
-
-def _poses(model: Any, values: Any, states: Any, out: Any, cut: Any) -> None:
-    for block in range(states.shape[0]):
-        plant, result = parameters_of(model, rows_of(values)), rows_of(out[block])
-        n = len(cut)
-        q, rate = part(rows_of(states[block]), 0, cut), part(rows_of(states[block]), n, cut)
-        place, turning = planes_like(q), lanes_like(q)
-        bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
-        bend_of(plant, q, rate, bend, speed)
-        angle, zero = bend[0], speed[0]
-        position, _ = tip_pose(plant, q)
-        tip_jacobian(plant, q, place, turning)
-        along, across = planar(1.0 + zero, zero), planar(zero, 1.0 + zero)
-        result[0] = dot(position, along)
-        result[1] = dot(position, across)
-        result[2] = angle
-        for k in range(n):
-            result[3 + k] = dot(place[k], along)
-            result[3 + n + k] = dot(place[k], across)
-            result[3 + 2 * n + k] = turning[k]
-
-
-def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
-    """Pose of the last disc at coordinates q (B, q) of a wrist cut into n segments."""
-    count, k = q.shape
-    states = to_blocks(np.concatenate([q, np.zeros((count, k))], axis=1))
-    out = np.empty((len(states), 3 + 3 * k, *states.shape[2:]))
-    values = spread(model.values(wrist, n), width(count))[0]
-    kernel_of(_poses, model)(model, values, states, out, (0,) * k)
-    rows = to_rows(out, count)
-    return Pose(rows[:, :2], rows[:, 2], rows[:, 3:].reshape(count, 3, k))
 
 
 def _path_at(model: Any, values: Any, state: Any, out: Any, cut: Any, pulls: Any) -> None:
