@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.augmented import equation_of_motion, tendon_columns
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist import augmented
+from wristctl.wrist.augmented import joints
 from wristctl.wrist.compiled_model import integrate, linearised, terms
 from wristctl.wrist.segments import Segments, segments
 
@@ -27,7 +28,7 @@ def test_fast_form_equals_the_papers_augmented_form(n: int) -> None:
     values = segments(wrist, n)
     for seed in range(5):
         theta, rate = random_state(n, seed)
-        mass, coriolis, gravity, _, pose = augmented.equation_of_motion(Segments(*values), theta, rate)
+        mass, coriolis, gravity, _, pose = equation_of_motion(Segments(*values), theta, rate)
         fast = terms(values, theta, rate)
         np.testing.assert_allclose(fast.mass, mass, rtol=1e-10, atol=1e-14)
         np.testing.assert_allclose(fast.bias, coriolis @ rate + gravity, rtol=1e-10, atol=1e-12)
@@ -38,7 +39,7 @@ def test_fast_form_equals_the_papers_augmented_form(n: int) -> None:
 def test_tip_force_enters_by_the_transposed_jacobian(n: int) -> None:
     theta, rate = random_state(n, 7)
     free, loaded = segments(WRIST, n), segments(WRIST, n, force=(1.3, -0.7))
-    jacobian = augmented.equation_of_motion(Segments(*free), theta, rate)[3]
+    jacobian = equation_of_motion(Segments(*free), theta, rate)[3]
     change = terms(loaded, theta, rate).bias - terms(free, theta, rate).bias
     np.testing.assert_allclose(change, -jacobian.T @ [1.3, -0.7], rtol=1e-12, atol=1e-15)
 
@@ -48,10 +49,10 @@ def test_tendon_arms_agree_with_the_augmented_columns(n: int) -> None:
     theta, rate = random_state(n, 3)
     wrist = WRIST.model_copy(update={"discs": n + 1})  # one span per segment
     values = Segments(*segments(wrist, n))
-    mu, jacobian, _ = augmented.joints(theta, values.length)
+    mu, jacobian, _ = joints(theta, values.length)
     arms = terms(np.array(values), theta, rate).moment_arms
     for k in range(n):
-        columns = augmented.tendon_columns(mu[4 * k : 4 * k + 4], values.tendon_offset)
+        columns = tendon_columns(mu[4 * k : 4 * k + 4], values.tendon_offset)
         np.testing.assert_allclose(arms[k], jacobian[4 * k : 4 * k + 4, k] @ columns, rtol=1e-12)
 
 
@@ -79,7 +80,7 @@ def test_mass_matrix_is_symmetric_and_positive_definite_over_the_range(n: int, d
 def test_rate_of_mass_matrix_less_twice_coriolis_is_skew(n: int) -> None:
     theta, rate = random_state(n, 11)
     values = Segments(*segments(WRIST, n))
-    coriolis = augmented.equation_of_motion(values, theta, rate)[1]
+    coriolis = equation_of_motion(values, theta, rate)[1]
     h = 1e-6
     ahead, behind = (terms(np.array(values), theta + s * h * rate, rate).mass for s in (1, -1))
     skew = (ahead - behind) / (2 * h) - 2 * coriolis
