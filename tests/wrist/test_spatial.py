@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.oracles.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
+from tests.oracles.spatial_energy import spatial_energy
 from tests.wrist.turned_in_space import turned
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -20,7 +21,6 @@ from wristctl.wrist.spatial.spatial_model import spatial_integrate, spatial_line
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, ellipse, spatial_values
 from wristctl.wrist.spatial.spatial_statics import (
     least_spatial_stiffness,
-    spatial_energy,
     spatial_equilibrium,
     spatial_stiffness,
 )
