@@ -16,7 +16,7 @@ from wristctl.lanes.rows import rows_of
 from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.statics import equilibrium, least_stiffness, stiffness
-from wristctl.wrist.tendons import allocate, reach, torque_of
+from wristctl.wrist.tendons import allocate, moment_arms, reach
 
 WRIST = WristParameters()
 
@@ -28,7 +28,8 @@ def _allocate(parameters: Any, asked: Any, out: Any) -> None:
     plus, minus = allocate(row[0], wrist, row[1], row[2], row[3])
     result[2] = plus
     result[3] = minus
-    result[4] = torque_of(row[0], wrist, plus, minus)
+    arms = moment_arms(row[0], wrist)
+    result[4] = arms[0] * plus + arms[1] * minus
 
 
 def allocated(theta: float, torque: float, low: float, high: float) -> np.ndarray:

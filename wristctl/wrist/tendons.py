@@ -60,10 +60,3 @@ def allocate(theta: Any, wrist: Any, torque: Any, low: Any, high: Any) -> Any:
     forward = torque > (plus + minus) * low
     needed = clip((torque - where(forward, minus, plus) * low) / where(forward, plus, minus), low, high)
     return where(forward, needed, low), where(forward, low, needed)
-
-
-@compiled
-def torque_of(theta: Any, wrist: Any, plus: Any, minus: Any) -> Any:
-    """Torque [N m] of both sides' pulls [N] on the one-segment wrist ("force": A_b F_t)."""
-    arm_plus, arm_minus = moment_arms(theta, wrist)
-    return arm_plus * plus + arm_minus * minus
