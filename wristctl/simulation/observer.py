@@ -82,7 +82,8 @@ class Watch(NamedTuple):
 
 
 class Knowing(NamedTuple):
-    """Belief of the controller's side and its drive, and rows as long as those of bends, pulls and moment arms."""
+    """Belief of the controller's side and its drive, and rows as long as those of bends, pulls and moment arms; of one
+    loop's arrays tuples with an entry for each plane, place and arm."""
 
     belief: Any
     drive: Any
@@ -91,20 +92,10 @@ class Knowing(NamedTuple):
     arms: Any
 
 
-class Known(NamedTuple):
-    """One loop's arrays behind Knowing: belief and drive, and tuples with an entry for each plane, place and arm."""
-
-    belief: Any
-    drive: Any
-    bend: Any
-    pulls: Any
-    arms: Any
-
-
-def known_of_sides(wrist: WristParameters, actuator: Actuator, alike: ArrayLike = SIDES) -> Known:
+def known_of_sides(wrist: WristParameters, actuator: Actuator, alike: ArrayLike = SIDES) -> Knowing:
     """Knowledge of a controller's side in one plane, with so many tendons alike on either side (2,)."""
     counts = np.array(alike, float)
-    return Known(Sides(segments(wrist, 1)[None], counts), drive_of(actuator, counts), (0,), (0, 0), (0, 0))
+    return Knowing(Sides(segments(wrist, 1)[None], counts), drive_of(actuator, counts), (0,), (0, 0), (0, 0))
 
 
 @spelled_out
