@@ -26,7 +26,6 @@ from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 
 __all__ = ["host_on"]  # a fixture of the bench's tests
 HERE = Path(__file__).parent
@@ -133,8 +132,8 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
     assert np.isfinite(theta).all() and (theta[-1] == theta[-100]).all()
 
 
-# Tendons that no plant in one plane has.
-IN_SPACE = {*(plant.parameters for plant in PLANTS_IN_SPACE.values()), PulledPlaces, ElasticPlaces, RealPlaces}
+# What no plant in one plane is made of.
+IN_SPACE = {plant.parameters for plant in PLANTS_IN_SPACE.values()}
 
 
 def _reached(functions: Iterable[CPUDispatcher], others: Collection[type]) -> set[Path]:

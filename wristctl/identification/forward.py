@@ -28,6 +28,7 @@ from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
 from wristctl.simulation.nonideal import (
     faults_of,
+    faults_of_sides,
     inner_of,
     nonideal_of,
     place_after_slip,
@@ -40,14 +41,12 @@ from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import FIELDS, own_values, rows_of_tendons
-from wristctl.wrist.spatial.spooled_tendons import RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import (
     Nonideal,
     RealTendons,
     shortening,
     spool_pull,
-    stiffness_at,
     tendons_in_lanes,
 )
 
@@ -101,7 +100,6 @@ class _Lanes(NamedTuple):
 
     wrist: Any
     tendons: Any
-    """RealTendons, or RealPlaces in two planes."""
     spools: Any
     """Of each tendon what it has reeled in more [m], its lever across [m], `per_newton` and `per_mass` of its field;
     then `radian` and `decay` of all fields, and Across."""
@@ -165,7 +163,7 @@ def _follow(model: Any, lanes: Any, reeled: Any, shapes: Any, out: Any) -> None:
             for p in range(len(shapes.rates)):
                 row[planes + p] = speed[p]
         if planes == 1:
-            advance_across(bent, pulls, levers, across, (zero, zero), stiffness_at(tendons, 0), h)
+            advance_across(bent, pulls, levers, across, (zero, zero), tendons.stiffness[0], h)
         for t in range(len(shapes.worn)):
             on_spools[t] = place_after_slip(tendons, t, on_spools[t], zero, k * h + zero, shortening(path, t))
         alive, _ = advance_or_stop(wrist, q, rate, on_spools, tendons, h + zero, alive)
@@ -246,14 +244,15 @@ def _lanes(
         of_each = np.array([taut, np.resize(levers, tendons), *fields])[:, order]
         spools = [*of_each.ravel(), field.radian, field.decay, *constants, 0.0]
         stiffness = alike * own_stiffness(each.tendons, each.rotors)
-        faults = faults_of(each.tendons, each.facts, alike).ravel()
-        rows.append((_values(each, n, model), stiffness, imperfect, faults, memory, spools))
+        faults = (
+            faults_of_sides(imperfect, tendons) if model.planes == 1 else faults_of(each.tendons, each.facts, alike)
+        )
+        rows.append((_values(each, n, model), stiffness, imperfect, faults.ravel(), memory, spools))
     columns = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
     values, stiffnesses, nonideals, of_faults, memories, of_spools = columns
     at_rest = np.zeros((count, coordinates))
     inner = inner_of([each.plant for each in candidates], at_rest, np.zeros(count), to_blocks, model.planes)
-    places = RealPlaces(stiffnesses, nonideals, of_faults, memories, inner, (0,) * tendons)
-    own = RealTendons(stiffnesses, nonideals, memories, inner) if model.planes == 1 else places
+    own = RealTendons(stiffnesses, nonideals, of_faults, memories, inner, (0,) * tendons, (0,) * len(path))
     return _Lanes(values, own, of_spools, np.zeros((len(values), 2 * coordinates + 2 * tendons + 3, *values.shape[2:])))
 
 

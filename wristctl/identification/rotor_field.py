@@ -16,7 +16,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, minimum, sin
 from wristctl.lanes.lane import zero_like
 from wristctl.simulation.nonideal import electrical_turn
-from wristctl.wrist.tendon_mechanics import spool_pull, stiffness_at
+from wristctl.wrist.tendon_mechanics import spool_pull
 
 # Largest phase [rad] of a rotor's swing in one substep: leapfrog's frequency is off by its square over 24, 4e-4.
 _PHASE = 0.1
@@ -149,7 +149,7 @@ def _stand(rotors: Any, field: Any, tendons: Any, counted: Any, state: Any, t: i
 @compiled
 def _wind(rotors: Any, field: Any, tendons: Any, counted: Any, state: Any, t: int, shortened: Any, h: float) -> Any:
     _, pull = counted
-    return pull * field.per_newton / stiffness_at(tendons, t) + shortened
+    return pull * field.per_newton / tendons.stiffness[t] + shortened
 
 
 @implements(turn_rotor, Swinging)

@@ -133,10 +133,9 @@ class LoopState(NamedTuple):
     """State of the rollouts, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `memory` is the law's in each plane,
-    `coordinates` the plant's with their rates, `tendons` as they are with their state: Tendons of
-    `wristctl.wrist.tendon_mechanics` in one plane, Places of `wristctl.wrist.spatial.spooled_tendons` in two. `record`
-    [block, sample, column, lane] takes each sample's values, all or briefly, or has no samples. `watch` is the camera
-    with its observer, or NoCamera.
+    `coordinates` the plant's with their rates, `tendons` as they are with their state
+    (`wristctl.wrist.tendon_mechanics`). `record` [block, sample, column, lane] takes each sample's values, all or
+    briefly, or has no samples. `watch` is the camera with its observer, or NoCamera.
     """
 
     which: Any

@@ -27,7 +27,7 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import by_type, implements, kernel, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.lanes.rows import entries, lanes_like, part, rows_of
 from wristctl.wrist.kinematics import Backbone
 from wristctl.wrist.tendon_mechanics import (
     WRAPPED,
@@ -36,6 +36,7 @@ from wristctl.wrist.tendon_mechanics import (
     PulledTendons,
     RealTendons,
     X,
+    paths_of,
     row_of,
     update_memory,
 )
@@ -206,23 +207,24 @@ def path_before(tendons: Any, plant: Any, q: Any) -> Any:
 
 @implements(path_before, NoTendons, PulledTendons)
 @implements(path_along, NoTendons, PulledTendons)
-def no_path(tendons: Any, plant: Any, q: Any) -> Any:
-    """Zeros."""
+def _no_path(tendons: Any, plant: Any, q: Any) -> Any:
     zero = zero_like(q[0])
     return zero, zero, zero
 
 
 @implements(path_before, ElasticTendons)
 @implements(path_along, ElasticTendons, RealTendons)
-def travelled(tendons: Any, plant: Any, q: Any) -> Any:
-    """The plant's `travel`."""
+def _travelled(tendons: Any, plant: Any, q: Any) -> Any:
     return travel(plant, q)
 
 
 @implements(path_before, RealTendons)
 def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
-    state = tendons.state
-    return state[row_of(0, X)], state[row_of(1, X)], state[row_of(0, WRAPPED)]
+    path = lanes_like(part(tendons.state, 0, tendons.path))
+    shortened = paths_of(path)
+    for i in range(len(path)):
+        path[i] = tendons.state[row_of(i, X) if i < shortened else row_of(i - shortened, WRAPPED)]
+    return entries(path)
 
 
 @cache
