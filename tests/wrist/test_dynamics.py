@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,10 +12,13 @@ from hypothesis import strategies as st
 from tests.oracles.augmented import equation_of_motion, tendon_columns
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.augmented import joints
-from wristctl.wrist.compiled_model import integrate, linearised, terms
+from wristctl.wrist.compiled_model import linearised, terms
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import Segments, segments
 
 WRIST = WristParameters()
+moved = partial(integrate, PCC)
 ANGLE = np.deg2rad(WRIST.range_deg)
 
 
@@ -112,8 +117,8 @@ def test_segments_of_equal_angle_form_one_arc() -> None:
 def test_left_is_the_mirror_of_right() -> None:
     values = segments(WRIST, 4)
     still, times = np.zeros(4), np.arange(1, 11) * 0.1
-    right = integrate(values, still, still, [30.0, 4.0], times)[0]
-    left = integrate(values, still, still, [4.0, 30.0], times)[0]
+    right = moved(values, still, still, [30.0, 4.0], times)[0]
+    left = moved(values, still, still, [4.0, 30.0], times)[0]
     np.testing.assert_allclose(right, -left, rtol=0, atol=1e-13)
     assert np.abs(right).max() > 0.1
 
@@ -138,7 +143,7 @@ def test_energy_is_conserved_without_damping_to_the_integrators_order(n: int) ->
     before = energy(values, theta, rate)
     drift = []
     for h in (4e-4, 2e-4, 1e-4):
-        late, late_rate = integrate(values, theta, rate, [0.0, 0.0], [0.5], h)
+        late, late_rate = moved(values, theta, rate, [0.0, 0.0], [0.5], h)
         drift.append(abs(energy(values, late[-1], late_rate[-1]) - before))
     assert drift[-1] < 1e-6 * before
     assert drift[0] / drift[1] > 6.0 and drift[1] / drift[2] > 6.0
@@ -148,13 +153,11 @@ def test_energy_is_conserved_without_damping_to_the_integrators_order(n: int) ->
 def test_integrator_converges_with_third_order(n: int) -> None:
     values = segments(WRIST, n)
     still = np.zeros(n)
-    fine = integrate(values, still, still, [25.0, 4.0], [0.08], 1e-5)[0]
-    errors = [
-        np.abs(integrate(values, still, still, [25.0, 4.0], [0.08], h)[0] - fine).max() for h in (4e-3, 2e-3, 1e-3)
-    ]
+    fine = moved(values, still, still, [25.0, 4.0], [0.08], 1e-5)[0]
+    errors = [np.abs(moved(values, still, still, [25.0, 4.0], [0.08], h)[0] - fine).max() for h in (4e-3, 2e-3, 1e-3)]
     assert all(errors[i] / errors[i + 1] > 5.0 for i in range(2)), errors
 
 
 def test_times_between_steps_are_refused() -> None:
     with pytest.raises(ValueError, match="whole numbers of steps"):
-        integrate(segments(WRIST, 1), [0.0], [0.0], [1.0, 1.0], [0.0105], 1e-3)
+        moved(segments(WRIST, 1), [0.0], [0.0], [1.0, 1.0], [0.0105], 1e-3)

@@ -8,6 +8,7 @@ from typing import Any
 
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.lane import zero_like
+from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist import arcs, tendons
 from wristctl.wrist.segments import Segments
 
@@ -77,3 +78,12 @@ def bend_along(segment: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
         angle = angle + q[k]
         turning = turning + rate[k]
     bend[0], speed[0] = angle, turning
+
+
+_load = replacing("stiffness", "force_y")
+
+
+@compiled
+def disturbed_chain(segment: Any, force: Any, scale: Any) -> Any:
+    """The wrist with a force (3) more on the last disc [N], which it feels across alone, and stiffness scaled."""
+    return _load(segment, (scale * segment.stiffness, force[1] + segment.force_y))

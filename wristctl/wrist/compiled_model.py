@@ -16,10 +16,8 @@ from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, 
 from wristctl.wrist import tendons
 from wristctl.wrist.arcs import Chords, chords, tip
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import Segments, load_segments
-from wristctl.wrist.tendon_mechanics import NoTendons
 
 
 class Terms(NamedTuple):
@@ -120,35 +118,3 @@ def linearised(
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
     return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
-
-
-@kernel
-def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segments: Any) -> None:
-    segment, pull = load_segments(rows_of(parameters)), rows_of(pulls)
-    n = len(segments)
-    for sample in range(steps.shape[0]):
-        state = rows_of(out[sample + 1])
-        before = rows_of(out[sample])
-        for i in range(2 * n):
-            state[i] = before[i]
-        theta, omega = part(state, 0, segments), part(state, n, segments)
-        for _ in range(steps[sample]):
-            step(segment, theta, omega, (pull[0], pull[1]), NoTendons(), h + zero_like(pull[0]))
-
-
-def integrate(
-    parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
-) -> tuple[Array, Array]:
-    """Motion from one state under held pulls [N] of the two sides: angles and rates (T, n) at the given times [s].
-
-    Steps of h; every time must be a whole number of steps.
-    """
-    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
-    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
-        raise ValueError(f"times must be whole numbers of steps of {h} s")
-    n = len(np.atleast_1d(theta))
-    out = np.empty((len(counts) + 1, 2 * n))
-    out[0] = np.concatenate([np.atleast_1d(theta), np.atleast_1d(omega)])
-    held = np.ascontiguousarray(pulls, float)
-    _integrate(np.ascontiguousarray(parameters, float), held, h, np.diff(counts, prepend=0), out, (0,) * n)
-    return out[1:, :n], out[1:, n:]

@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numba.core.registry import CPUDispatcher
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
+from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS as _TABLE
@@ -244,6 +245,35 @@ def path_at(model: PlantModel, values: Array, q: Array, places: int) -> Array:
     out = np.empty(3 if model.planes == 1 else 2 * places)
     kernel_of(_path_at, model)(model, values, np.ascontiguousarray(q, float), out, (0,) * len(q), (0,) * places)
     return out
+
+
+def _integrate(model: Any, values: Any, pulls: Any, h: float, steps: Any, out: Any, cut: Any, places: Any) -> None:
+    plant, held, m = parameters_of(model, rows_of(values), places), part(rows_of(pulls), 0, places), len(cut)
+    for sample in range(steps.shape[0]):
+        state, before = rows_of(out[sample + 1]), rows_of(out[sample])
+        for i in range(2 * m):
+            state[i] = before[i]
+        q, rate = part(state, 0, cut), part(state, m, cut)
+        for _ in range(steps[sample]):
+            advance(plant, q, rate, held, NoTendons(), h + zero_like(held[0]))
+
+
+def integrate(
+    model: PlantModel, values: Array, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
+) -> tuple[Array, Array]:
+    """Motion from one state under held pulls [N] of each place: coordinates and rates (K, q) at K times [s].
+
+    Steps of h; every time must be a whole number of steps.
+    """
+    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
+    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
+        raise ValueError(f"times must be whole numbers of steps of {h} s")
+    begin, held = np.concatenate([q, rate]).astype(float), np.ascontiguousarray(pulls, float)
+    out, m = np.empty((len(counts) + 1, len(begin))), len(begin) // 2
+    out[0] = begin
+    shapes = (0,) * m, (0,) * len(held)
+    kernel_of(_integrate, model)(model, values, held, h, np.diff(counts, prepend=0), out, *shapes)
+    return out[1:, :m], out[1:, m:]
 
 
 @spelled_out

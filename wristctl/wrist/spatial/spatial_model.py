@@ -18,9 +18,7 @@ from wristctl.wrist.spatial.posture import bend_segments, posture_like, spatial_
 from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, momenta_like, spatial_bias, spatial_mass_matrix
 from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
 from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, SpatialWrist, load_spatial_segments
-from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
-from wristctl.wrist.tendon_mechanics import NoTendons
 
 
 class SpatialTerms(NamedTuple):
@@ -160,39 +158,3 @@ def spatial_linearised(
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     r, by_q, by_rate = np.split(rows, [m, m + m * m], axis=-1)
     return r, by_q.reshape(*batch, m, m), by_rate.reshape(*batch, m, m)
-
-
-@kernel
-def _integrate(
-    parameters: Any, pulls: Any, h: float, steps: Any, out: Any, cut: Any, of_tendons: Any, of_pulls: Any
-) -> None:
-    values = rows_of(parameters)
-    wrist = SpatialWrist(load_spatial_segments(values), part(values, FIELDS, of_tendons))
-    held, m = part(rows_of(pulls), 0, of_pulls), len(cut)
-    for sample in range(steps.shape[0]):
-        state, before = rows_of(out[sample + 1]), rows_of(out[sample])
-        for i in range(2 * m):
-            state[i] = before[i]
-        q, rate = part(state, 0, cut), part(state, m, cut)
-        for _ in range(steps[sample]):
-            spatial_step(wrist, q, rate, held, NoTendons(), h + zero_like(wrist.segment.length))
-
-
-def spatial_integrate(
-    parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
-) -> tuple[Array, Array]:
-    """Motion from one state under held pulls [N] of the T tendons: coordinates and rates (K, 2n) at K times [s].
-
-    Steps of h; every time must be a whole number of steps.
-    """
-    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
-    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
-        raise ValueError(f"times must be whole numbers of steps of {h} s")
-    q = np.asarray(q, float)
-    values, shapes = _shapes(parameters, q)
-    m = q.shape[-1]
-    out = np.empty((len(counts) + 1, 2 * m))
-    out[0] = np.concatenate([q, np.asarray(rate, float)])
-    held, row = np.ascontiguousarray(pulls, float), np.ascontiguousarray(values[0])
-    _integrate(row, held, h, np.diff(counts, prepend=0), out, *shapes)
-    return out[1:, :m], out[1:, m:]
