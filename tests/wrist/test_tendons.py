@@ -30,7 +30,7 @@ def _allocate(parameters: Any, asked: Any, out: Any) -> None:
     plus, minus = allocate(row[0], wrist, row[1], row[2], row[3])
     result[2] = plus
     result[3] = minus
-    arms = moment_arms(row[0], wrist)
+    arms = moment_arms(wrist, row[0])
     result[4] = arms[0] * plus + arms[1] * minus
 
 

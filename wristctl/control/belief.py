@@ -8,7 +8,7 @@ from the last to the first: so of two products it is the first that fuses with i
 from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import planar, where, zero_like
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_at, rows_of, square_like
@@ -93,7 +93,7 @@ def moment_arms_at(wrist: Any, bend: Any, arms: Any) -> None:
 
 @implements(moment_arms_at, Segments)
 def _arms_of_sides(wrist: Any, bend: Any, arms: Any) -> None:
-    arms[0], arms[1] = moment_arms(bend[0], wrist)
+    arms[0], arms[1] = moment_arms(wrist, bend[0])
 
 
 @implements(moment_arms_at, SpatialWrist)
@@ -109,7 +109,7 @@ def lengths_at(wrist: Any, bend: Any, out: Any) -> None:
 
 @implements(lengths_at, Segments)
 def _lengths_of_sides(wrist: Any, bend: Any, out: Any) -> None:
-    out[0], out[1] = lengths(bend[0], wrist)
+    out[0], out[1] = lengths(wrist, bend[0])
 
 
 @implements(lengths_at, SpatialWrist)
@@ -260,9 +260,7 @@ def miss(wrist: Any, wanted: Any, torque: Any, reached: Any, missed: Any) -> Non
     raise NotImplementedError("compiled code only")
 
 
-@implements(miss, Segments)
-def _miss_nothing(wrist: Any, wanted: Any, torque: Any, reached: Any, missed: Any) -> None:
-    pass
+implements(miss, Segments)(nothing)
 
 
 @implements(miss, SpatialWrist)

@@ -309,6 +309,15 @@ def implements(declared: Any, *kinds: Any) -> Callable[[F], F]:
     return keep
 
 
+def nothing(part: Any, *others: Any) -> None:
+    """Body of what an absent part does."""
+
+
+def itself(part: Any) -> Any:
+    """Body of what gives the part as it is."""
+    return part
+
+
 def kernel(function: F, *extra_sources: Path) -> F:
     """Compile for Python, which calls it, and keep it in the cache.
 

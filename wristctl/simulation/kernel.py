@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_at
 from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
@@ -261,9 +261,7 @@ def _onward(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: 
     raise NotImplementedError("compiled code only")
 
 
-@implements(_onward, IdealDrive, LaggedDrive)
-def _stays(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
-    pass
+implements(_onward, IdealDrive, LaggedDrive)(nothing)
 
 
 @implements(_onward, SpoolDrive, ServoDrive)

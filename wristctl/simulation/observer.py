@@ -16,7 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Sides, belief_in_lanes, coupling, moment_arms_at
 from wristctl.control.model import one_segment
 from wristctl.control.response import OF_A_PLANE
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, held_stiffness
@@ -250,9 +250,7 @@ def go_on(watch: Any, knowing: Any, tick: int, counts: Any, h: float) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(go_on, NoCamera)
-def _nothing(watch: Any, knowing: Any, tick: int, counts: Any, h: float) -> None:
-    pass
+implements(go_on, NoCamera)(nothing)
 
 
 @implements(go_on, Watch)

@@ -49,19 +49,13 @@ def _chords(segment: Any, theta: Any, arc: Any) -> Any:
     return arcs.chords(theta, segment.length, arc)
 
 
-@implements(lengths, Segments)
-def _lengths(segment: Any, theta: Any) -> Any:
-    return tendons.lengths(theta, segment)
+implements(lengths, Segments)(tendons.lengths)
 
 
-@implements(moment_arms, Segments)
-def _moment_arms(segment: Any, theta: Any) -> Any:
-    return tendons.moment_arms(theta, segment)
+implements(moment_arms, Segments)(tendons.moment_arms)
 
 
-@implements(tendon_torques, Segments)
-def _tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
-    tendons.tendon_torques(theta, segment, plus, minus, torque, slope)
+implements(tendon_torques, Segments)(tendons.tendon_torques)
 
 
 @implements(spring, Segments)

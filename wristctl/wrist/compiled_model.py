@@ -52,8 +52,8 @@ def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         for i in range(n):
             angle = angle + theta[i]
             result[3 + i] = r[i] - segment.stiffness * theta[i] - segment.damping * omega[i]
-            length_plus, length_minus = tendons.lengths(theta[i], segment)
-            arm_plus, arm_minus = tendons.moment_arms(theta[i], segment)
+            length_plus, length_minus = tendons.lengths(segment, theta[i])
+            arm_plus, arm_minus = tendons.moment_arms(segment, theta[i])
             result[3 + n + 4 * i] = length_plus
             result[4 + n + 4 * i] = length_minus
             result[5 + n + 4 * i] = arm_plus
@@ -89,7 +89,7 @@ def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         mass, by_theta, by_rate = square_like(theta), square_like(theta), square_like(theta)
         r, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta)
         tangent = chords(theta, segment.length, arc)
-        tendons.tendon_torques(theta, segment, pulls[0], pulls[1], pull, slope)
+        tendons.tendon_torques(segment, theta, pulls[0], pulls[1], pull, slope)
         mass_matrix(segment, arc, tangent, mass)
         bias(segment, theta, omega, arc, tangent, pull, r)
         residual_jacobians(segment, omega, acceleration, arc, tangent, slope, by_theta, by_rate)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, itself, nothing
 from wristctl.lanes.functions import expm1_of_negative
 from wristctl.lanes.lane import sqrt, where
 from wristctl.lanes.rows import rows_of
@@ -84,9 +84,7 @@ def inner_in_lanes(inner: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(inner_in_lanes, NoInnerFriction)
-def _none_in_lanes(inner: Any) -> Any:
-    return inner
+implements(inner_in_lanes, NoInnerFriction)(itself)
 
 
 @implements(inner_in_lanes, InnerFriction)
@@ -118,9 +116,7 @@ def resist(inner: Any, theta: Any, r: Any) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(resist, NoInnerFriction)
-def _resist_nothing(inner: Any, theta: Any, r: Any) -> None:
-    pass
+implements(resist, NoInnerFriction)(nothing)
 
 
 @implements(resist, InnerFriction)
@@ -144,9 +140,7 @@ def resist_slope(inner: Any, theta: Any, omega: Any, by_theta: Any) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(resist_slope, NoInnerFriction)
-def _no_slope(inner: Any, theta: Any, omega: Any, by_theta: Any) -> None:
-    pass
+implements(resist_slope, NoInnerFriction)(nothing)
 
 
 @implements(resist_slope, InnerFriction)
@@ -175,9 +169,7 @@ def remember_bend(inner: Any, theta: Any) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(remember_bend, NoInnerFriction)
-def _remember_nothing(inner: Any, theta: Any) -> None:
-    pass
+implements(remember_bend, NoInnerFriction)(nothing)
 
 
 @implements(remember_bend, InnerFriction)

@@ -10,7 +10,7 @@ order system the 2n equations of each stage reduce to n:
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
@@ -90,14 +90,10 @@ def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate
     raise NotImplementedError("compiled code only")
 
 
-@implements(yield_, NoTendons, ElasticTendons)
-def stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
-    """There is none of it."""
+implements(yield_, NoTendons, ElasticTendons)(nothing)
 
 
-@implements(yield_jacobians, NoTendons, ElasticTendons)
-def stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    """There is none of it."""
+implements(yield_jacobians, NoTendons, ElasticTendons)(nothing)
 
 
 @implements(yield_, PulledTendons, RealTendons)

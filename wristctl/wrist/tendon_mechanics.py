@@ -12,7 +12,7 @@ Springs creep alike.
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, itself, nothing
 from wristctl.lanes.functions import exp, maximum
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
@@ -129,9 +129,7 @@ def tendons_in_lanes(tendons: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(tendons_in_lanes, NoTendons)
-def _none(tendons: Any) -> Any:
-    return tendons
+implements(tendons_in_lanes, NoTendons)(itself)
 
 
 @compiled
@@ -317,9 +315,7 @@ def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any
     raise NotImplementedError("compiled code only")
 
 
-@implements(stiffen, NoTendons, PulledTendons)
-def _stiffen_nothing(tendons: Any, segment: Any, theta: Any, omega: Any, pulls: Any, path: Any, by_theta: Any) -> None:
-    pass
+implements(stiffen, NoTendons, PulledTendons)(nothing)
 
 
 @implements(stiffen, ElasticTendons, RealTendons)
@@ -348,9 +344,7 @@ def update_memory(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None
     raise NotImplementedError("compiled code only")
 
 
-@implements(update_memory, NoTendons, ElasticTendons)
-def _update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
-    pass
+implements(update_memory, NoTendons, ElasticTendons)(nothing)
 
 
 @implements(update_memory, PulledTendons)

@@ -6,11 +6,11 @@ the torque of one plane's stop at that depth. Springs creep by each coordinate; 
 
 from typing import Any
 
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
 from wristctl.wrist.dahl import direction_of, resist, resist_slope
-from wristctl.wrist.integrator import stay, stay_jacobians, stop_contact
+from wristctl.wrist.integrator import stop_contact
 from wristctl.wrist.spatial.spatial_chain import springs_of
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, row_of
 
@@ -27,8 +27,8 @@ def yield_jacobians_in_space(tendons: Any, q: Any, rate: Any, by_q: Any, by_rate
     raise NotImplementedError("compiled code only")
 
 
-implements(yield_in_space, NoTendons, ElasticTendons)(stay)
-implements(yield_jacobians_in_space, NoTendons, ElasticTendons)(stay_jacobians)
+implements(yield_in_space, NoTendons, ElasticTendons)(nothing)
+implements(yield_jacobians_in_space, NoTendons, ElasticTendons)(nothing)
 
 
 @compiled

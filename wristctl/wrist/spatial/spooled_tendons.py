@@ -6,7 +6,7 @@ along the bent wrist, and the bends of the segments that it runs along, which wr
 
 from typing import Any
 
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing
 from wristctl.lanes.lane import sqrt, zero_like
 from wristctl.lanes.rows import entries, lanes_like
 from wristctl.lanes.space import first_third
@@ -48,9 +48,7 @@ def stiffen_by_tendons(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input:
     raise NotImplementedError("compiled code only")
 
 
-@implements(stiffen_by_tendons, NoTendons, PulledTendons)
-def _soft(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, path: Any, by_q: Any) -> None:
-    pass
+implements(stiffen_by_tendons, NoTendons, PulledTendons)(nothing)
 
 
 @implements(stiffen_by_tendons, ElasticTendons, RealTendons)
