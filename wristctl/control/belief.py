@@ -70,7 +70,6 @@ class Places(NamedTuple):
 @by_type
 def belief_in_lanes(belief: Any) -> Any:
     """A Belief in lanes from one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(belief_in_lanes, Sides)
@@ -88,7 +87,6 @@ def _places_in_lanes(belief: Any) -> Any:
 @by_type
 def moment_arms_at(wrist: Any, bend: Any, arms: Any) -> None:
     """Write the moment arms [m] of a wrist of one segment that is bent like this [rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(moment_arms_at, Segments)
@@ -104,7 +102,6 @@ def _arms_of_places(wrist: Any, bend: Any, arms: Any) -> None:
 @by_type
 def lengths_at(wrist: Any, bend: Any, out: Any) -> None:
     """Write the lengths of the tendons' paths [m] through a wrist of one segment that is bent like this [rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(lengths_at, Segments)
@@ -120,7 +117,6 @@ def _lengths_of_places(wrist: Any, bend: Any, out: Any) -> None:
 @by_type
 def straight_at(wrist: Any, t: int) -> Any:
     """Length of a tendon's path through the straight wrist [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(straight_at, Segments)
@@ -139,7 +135,6 @@ def coupling(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any, ext
 
     It is what the one-segment model in two planes asks for beyond each plane's own.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(coupling, Ignored)
@@ -166,7 +161,6 @@ def _compensated(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any,
 @by_type
 def coupled(kind: Any, torque: Any, extra: Any) -> Any:
     """A law's torque with what the planes do to each other [N m]; where that is ignored, the torque to the last bit."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(coupled, Ignored)
@@ -230,7 +224,6 @@ def share_out(wrist: Any, arms: Any, wanted: Any, reached: Any, pulls: Any) -> A
 
     In one plane that is 1, or 0 where the torque is out of reach.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(share_out, Segments)
@@ -257,7 +250,6 @@ def miss(wrist: Any, wanted: Any, torque: Any, reached: Any, missed: Any) -> Non
 
     One plane has no other, and misses nothing.
     """
-    raise NotImplementedError("compiled code only")
 
 
 implements(miss, Segments)(nothing)

@@ -127,7 +127,6 @@ def turn_rotor(
     shortened : what its path is shorter by in the middle of the step [m]
     state : rows of place [m] and speed [m/s] of each rotor
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(turn_rotor, Standing)

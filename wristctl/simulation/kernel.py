@@ -258,7 +258,6 @@ def _onward(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: 
 
     `step` is the tick's time, by how much later the step begins, and how long it is [s].
     """
-    raise NotImplementedError("compiled code only")
 
 
 implements(_onward, IdealDrive, LaggedDrive)(nothing)
@@ -303,7 +302,6 @@ def gather_lanes(tables: Any, which: Any, sample: int, out: Any) -> None:
 @by_type
 def _under(acting: Any, which: Any, sample: int, out: Any, rows: Any, plant: Any) -> Any:
     """The plant under one sample's disturbances, which are gathered into `out`, the memory of the rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_under, Undisturbed)

@@ -197,7 +197,6 @@ def spools_after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path
 
     `speeds` are the spools' [m/s].
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(spools_after_slip, NoTendons, ElasticTendons)

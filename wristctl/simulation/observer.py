@@ -177,7 +177,6 @@ def _sample(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, h: fl
 def sense(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, rate: Any, h: float, seen: Any) -> None:
     """Write what the law sees (3 P rows): bends and rates as they are, or, behind a camera, as the observer has them
     with the load."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(sense, NoCamera)
@@ -247,7 +246,6 @@ def predict(observer: Any, knowing: Any, tick: int, counts: Any, h: float) -> No
 @by_type
 def go_on(watch: Any, knowing: Any, tick: int, counts: Any, h: float) -> None:
     """`predict` behind a camera; nothing where there is none."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(go_on, NoCamera)(nothing)

@@ -151,7 +151,6 @@ def drive_of(
 @by_type
 def drive_in_lanes(drive: Any) -> Any:
     """A drive of lanes from a drive whose motor is one block's array."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(drive_in_lanes, IdealDrive)(itself)

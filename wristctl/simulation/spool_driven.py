@@ -122,7 +122,6 @@ _WORKS = 3
 @by_type
 def _squares(plant: Any, rate: Any, sums: Any) -> None:
     """Add the products of rates that damping goes by, summed over the segments, to three rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_squares, Segments)
@@ -141,7 +140,6 @@ def _squares_in_space(plant: Any, rate: Any, sums: Any) -> None:
 @by_type
 def _damped(plant: Any, h: float, sums: Any) -> Any:
     """Work [J] that damping takes in a step of h [s] with these sums at its begin and its end together."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_damped, Segments)

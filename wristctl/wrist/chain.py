@@ -17,31 +17,26 @@ from wristctl.wrist.segments import Segments
 def chords(segment: Any, theta: Any, arc: Any) -> Any:
     """Chord of each part in base axes and its first three derivatives by its own coordinate, into Chords; the last
     tangent."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def lengths(segment: Any, theta: Any) -> Any:
     """Lengths of the + and the - side's tendons along one part [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def moment_arms(segment: Any, theta: Any) -> Any:
     """Moment arms of the + and the - side along one part: minus the lengths' derivatives by its coordinate [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
     """Torque of both sides' pulls [N] on each part and its derivative by that part's coordinate, into two rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def spring(segment: Any, k: int) -> Any:
     """Stiffness of the part k from the base [N m/rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(chords, Segments)

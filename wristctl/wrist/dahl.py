@@ -81,7 +81,6 @@ def inner_state(q: Array, z: float = 0.0) -> Array:
 @by_type
 def inner_in_lanes(inner: Any) -> Any:
     """Inner friction of lanes from that of one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(inner_in_lanes, NoInnerFriction)(itself)
@@ -113,7 +112,6 @@ def _turned_in_space(inner: Any, q: Any, k: int) -> Any:
 @by_type
 def resist(inner: Any, theta: Any, r: Any) -> None:
     """Add to the residual r (n,) the torque with which the wrist resists being at theta (n,)."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(resist, NoInnerFriction)(nothing)
@@ -137,7 +135,6 @@ def _resist_in_space(inner: Any, q: Any, r: Any) -> None:
 @by_type
 def resist_slope(inner: Any, theta: Any, omega: Any, by_theta: Any) -> None:
     """Add to dr/d(theta), (n, n), what inner friction adds at the start of a step."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(resist_slope, NoInnerFriction)(nothing)
@@ -166,7 +163,6 @@ def _resist_slope_in_space(inner: Any, q: Any, rate: Any, by_q: Any) -> None:
 @by_type
 def remember_bend(inner: Any, theta: Any) -> None:
     """Take the bristles over to the end of a step, at coordinates theta."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(remember_bend, NoInnerFriction)(nothing)

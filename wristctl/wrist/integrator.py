@@ -81,13 +81,11 @@ def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
 @by_type
 def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
     """Add to the residual r (n,) what end stops and inner friction take and what creeping springs give."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
     """Add what end stops and inner friction add to dr/d(theta) and dr/d(rate), (n, n)."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(yield_, NoTendons, ElasticTendons)(nothing)

@@ -163,26 +163,22 @@ def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: An
     `wristctl.wrist.integrator`'s. Returns an estimate of the step's error in the bending angle and in its rate
     [rad, rad/s], as an embedded solution of lower order gives it.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
     """Write the bend of the last disc [rad] and its rate [rad/s], a row for each plane."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def travel(plant: Any, q: Any) -> Any:
     """Shortening of the + and the - side's tendon paths from the straight wrist [m], and the bend that they are wrapped
     by [rad]; in two planes the shortening of each place's, then the bend that each is wrapped by."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def within(plant: Any, q: Any) -> Any:
     """Lanes in which the coordinates are ones that the plant can have."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
@@ -191,19 +187,16 @@ def disturbed(plant: Any, force: Any, scale: Any) -> Any:
 
     The force is along the straight wrist, across it toward positive bends, and aside, which one plane does not feel.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def path_along(tendons: Any, plant: Any, q: Any) -> Any:
     """Path of the tendons at coordinates q, as the plant's `travel`; zeros where pulls are held, which need none."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def path_before(tendons: Any, plant: Any, q: Any) -> Any:
     """Path of the tendons before a step, at coordinates q; real tendons remember it from the step before."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(path_before, NoTendons, PulledTendons)

@@ -126,7 +126,6 @@ Tendons = NoTendons | PulledTendons | ElasticTendons | RealTendons
 @by_type
 def tendons_in_lanes(tendons: Any) -> Any:
     """Tendons of lanes from tendons of one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(tendons_in_lanes, NoTendons)(itself)
@@ -228,13 +227,11 @@ def _at_wrist(tendons: Any, length: Any, t: int, path: Any, z: Any) -> Any:
 @by_type
 def pull_along(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
     """Pull [N] of one tendon at the wrist, at a path within a step."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def pull_at_start(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
     """Pull [N] of one tendon at the wrist at the start of a step, where it has not slid yet."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(pull_at_start, NoTendons, PulledTendons)
@@ -289,7 +286,6 @@ def pulls_at_start(tendons: Any, spool_input: Any, path: Any) -> Any:
 @by_type
 def pull_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     """Fall of one tendon's pull with its path's shortening at the start of a step [N/m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(pull_slope, ElasticTendons)
@@ -312,7 +308,6 @@ def _slid_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any
 @by_type
 def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, path: Any, by_theta: Any) -> None:
     """Add to dr/d(theta) (n, n) what tendons on held spools add: arm_i (-dT/dx) arm_j of each."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(stiffen, NoTendons, PulledTendons)(nothing)
@@ -341,7 +336,6 @@ def _stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, reeled: Any, pa
 @by_type
 def update_memory(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     """Take the state over to the end of a step, at coordinates theta with this path."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(update_memory, NoTendons, ElasticTendons)(nothing)

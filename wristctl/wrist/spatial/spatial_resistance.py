@@ -18,13 +18,11 @@ from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTen
 @by_type
 def yield_in_space(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, r: Any) -> None:
     """`wristctl.wrist.integrator.yield_` of a wrist in two planes."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def yield_jacobians_in_space(tendons: Any, q: Any, rate: Any, by_q: Any, by_rate: Any) -> None:
     """`wristctl.wrist.integrator.yield_jacobians` of a wrist in two planes."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(yield_in_space, NoTendons, ElasticTendons)(nothing)

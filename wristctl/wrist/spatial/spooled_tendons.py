@@ -45,7 +45,6 @@ def travel_in_space(wrist: Any, q: Any) -> Any:
 @by_type
 def stiffen_by_tendons(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, path: Any, by_q: Any) -> None:
     """Add to dr/dq what tendons on held spools add: arm_i (-dT/dx) arm_j of each, x its travel."""
-    raise NotImplementedError("compiled code only")
 
 
 implements(stiffen_by_tendons, NoTendons, PulledTendons)(nothing)
