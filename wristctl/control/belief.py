@@ -148,7 +148,7 @@ def _compensated(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any,
     segment, zero = known.wrist.segment, zero_like(bend[0])
     posture, momenta, mass, free = posture_like(bend), momenta_like(bend), square_like(bend), lanes_like(bend)
     free[0], free[1] = zero, zero
-    tangent = bend_segments(segment, bend, posture)
+    tangent, _, _ = bend_segments(segment, bend, posture)
     spatial_mass_matrix(segment, posture, tangent, mass, momenta)
     spatial_bias(segment, bend, rate, posture, tangent, free, extra)
     inertia_y, load_y = one_segment(load_segments(rows_at(known.models, 0)), bend[0], rate[0])

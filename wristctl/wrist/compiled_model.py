@@ -108,13 +108,21 @@ def linearised(
 
     `pulls` are the two sides' total tensions [N], shape (..., 2).
     """
-    theta, omega, acceleration = np.broadcast_arrays(theta, omega, acceleration)
-    *batch, n = theta.shape
-    pulls = np.broadcast_to(pulls, (*batch, 2))
-    states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
-    blocks, values = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
-    out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
-    _linearised(values, blocks, out, (0,) * n)
-    rows = to_rows(out, len(states)).reshape(*batch, -1)
-    r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
-    return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
+    values = np.reshape(parameters, (-1, len(Segments._fields)))
+    return linearised_by(_linearised, values, (theta, omega, acceleration), pulls, 2)
+
+
+def linearised_by(
+    function: Any, values: Array, motion: tuple[ArrayLike, ...], pulls: ArrayLike, places: int, *shapes: tuple[int, ...]
+) -> tuple[Array, Array, Array]:
+    """Residual (..., m) and its derivatives (..., m, m) by a kernel of rows of values, at coordinates, rates and
+    accelerations (..., m) under pulls (..., places) [N]; `shapes` are the kernel's further arguments."""
+    states_of = np.broadcast_arrays(*motion)
+    *batch, m = states_of[0].shape
+    states = np.concatenate([*states_of, np.broadcast_to(np.asarray(pulls, float), (*batch, places))], axis=-1)
+    states = states.astype(float).reshape(-1, 3 * m + places)
+    blocks = to_blocks(states)
+    out = np.empty((len(blocks), m + 2 * m * m, *blocks.shape[2:]))
+    function(spread(values, len(states)), blocks, out, (0,) * m, *shapes)
+    r, by_q, by_rate = np.split(to_rows(out, len(states)).reshape(*batch, -1), [m, m + m * m], axis=-1)
+    return r, by_q.reshape(*batch, m, m), by_rate.reshape(*batch, m, m)
