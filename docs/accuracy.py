@@ -23,7 +23,8 @@ from wristctl.simulation.closed_loop import repeat
 from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import Draws
-from wristctl.wrist.compiled_model import integrate
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import segments
 
 PAGE = Path(__file__).with_name("accuracy.md")
@@ -115,7 +116,9 @@ def of_the_step() -> Iterator[tuple[int, str, float, float, float]]:
     for n, modes in itertools.product((1, 2, 4, 8), ("slow", "all")):
         bent = np.full(n, 0.4 / n) if modes == "slow" else 0.4 / n * (-1.0) ** np.arange(n)
         still, pulls, times = np.zeros(n), (12.0, 8.0), 0.01 * np.arange(1, 21)
-        exact, *coarse = (integrate(segments(WRIST, n), bent, still, pulls, times, h)[0] for h in (2.5e-5, 1e-3, 5e-4))
+        exact, *coarse = (
+            integrate(PCC, segments(WRIST, n), bent, still, pulls, times, h)[0] for h in (2.5e-5, 1e-3, 5e-4)
+        )
         errors = [float(np.abs(each - exact).max()) for each in coarse]
         yield n, modes, errors[0], errors[1], float(np.log2(errors[0] / errors[1]))
 

@@ -15,9 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.wrist.compiled_model import integrate, terms
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import Segments
-from wristctl.wrist.spatial.spatial_model import spatial_integrate, spatial_terms
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import SpatialSegments, rows_of_tendons
 
 RELATIVE, ABSOLUTE, ANGLE = 1e-9, 1e-12, 1e-6
@@ -75,7 +78,7 @@ def planar_errors(vectors: dict[str, Any]) -> Iterator[tuple[str, float]]:
         still = np.zeros(case["parameters"]["n"])
         pulls = [case["tendon_force_n"]["plus"], case["tendon_force_n"]["minus"]]
         force = tuple(case["external_tip_force_n"])
-        theta, _ = integrate(parameters(case["parameters"], force), still, still, pulls, case["t_s"])
+        theta, _ = integrate(PCC, parameters(case["parameters"], force), still, still, pulls, case["t_s"])
         yield "trajectory", float(np.abs(theta - case["theta_rad"]).max()) / ANGLE
 
 
@@ -95,7 +98,7 @@ def spatial_errors(vectors: dict[str, Any]) -> Iterator[tuple[str, float]]:
             np.zeros(2 * case["parameters"]["n"]),
             spatial_parameters(case["parameters"], case["external_force_n"]),
         )
-        q, _ = spatial_integrate(values, still, still, case["tension_n"], case["t_s"])
+        q, _ = integrate(PCC_IN_SPACE, values, still, still, case["tension_n"], case["t_s"])
         yield "trajectory", float(np.abs(q - case["bend_rad"]).max()) / ANGLE
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from tests.bench.conftest import EXACT, TAUT, Host
 from tests.bench.test_load_cells import CELLS, SCALE, Kept, newtons
+from tests.oracles.spatial_energy import spatial_energy
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.loads import SpatialLoad
 from wristctl.bench.motors import spool_state_of, stepper_of
@@ -38,7 +39,7 @@ from wristctl.vision.two_views import bend_seen
 from wristctl.wrist.directions import ACTIVE, TENDONS
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import spatial_values
-from wristctl.wrist.spatial.spatial_statics import spatial_energy, spatial_equilibrium
+from wristctl.wrist.spatial.spatial_statics import spatial_equilibrium
 from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 
 pytestmark = pytest.mark.slow

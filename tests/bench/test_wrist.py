@@ -15,7 +15,9 @@ from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.worlds import plant_of
-from wristctl.wrist.compiled_model import integrate, terms
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibrium
 
@@ -48,7 +50,7 @@ def simulated(steps: Truth, start: float) -> np.ndarray:
                 left = np.exp(-ACTUATOR.friction * (ACTUATOR.sheath + np.abs(theta).sum()) * z[axis])
                 pull[side] += ACTUATOR.tendon_stiffness * stretch * left
             before = lengths
-            after = integrate(wrist, theta, omega, pull, [5e-5], 5e-5)
+            after = integrate(PCC, wrist, theta, omega, pull, [5e-5], 5e-5)
             theta, omega = after[0][0], after[1][0]
         angles.append(theta)
     return np.array(angles)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,10 +22,12 @@ from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import TendonPlace, WristParameters
-from wristctl.identification.driven_fit import DrivenFit, fitted_logs, predicted
-from wristctl.identification.driven_forward import inertia_of_arc
+from wristctl.identification.arc_robot import inertia_of_arc
+from wristctl.identification.driven_fit import DrivenFit, fitted_logs, motion_of
+from wristctl.identification.driven_log import recordings_of
 from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at
+from wristctl.records.open_log import OpenLog
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
 
 SEED = 20261129
@@ -35,6 +38,8 @@ BELIEVED = WristParameters.model_validate(
 _STEP, _SEGMENTS, _NOISE, _CURRENT = 1e-3, 4, math.radians(0.1), 4e-3
 # Least and largest moment of the plan over the stiffness [rad]; time of a log and of a circle [s].
 _BEND, _LOG, _CIRCLE = 0.45, 60.0, 12.0
+# Time at the begin of another log that gives its zero [s].
+_ZEROED = 2.0
 
 
 class DrivenRig(NamedTuple):
@@ -127,6 +132,16 @@ def truth_of(rig: DrivenRig) -> dict[str, float]:
     truth |= {"damping": rig.wrist.damping / stiffness, "inertia": inertia_of_arc(rig.wrist) / stiffness}
     truth |= {f"direction_{k}": math.radians(place.angle_deg) for k, place in enumerate(rig.wrist.tendons, 1)}
     return truth | {f"gain_{k}": float(rig.newtons[k - 1]) / mean for k in (2, 3)}
+
+
+def predicted(found: DrivenFit, log: OpenLog) -> tuple[float, float]:
+    """RMS error of another log's bends and their motion [rad]; its begin gives its zero."""
+    (recording,) = recordings_of([log], found.robot)
+    begin = recording.time < recording.time[0] + _ZEROED
+    nothing = np.zeros(len(begin), bool)
+    recording = replace(recording, session="another", zeroing=begin, fitted=nothing, asked=~begin)
+    asked = found.fit.asked_of(recording)
+    return asked.rms("asked"), motion_of([recording.measured[~begin]])
 
 
 def counted(number: int) -> Counted:

@@ -21,7 +21,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
 from wristctl.identification.driven_fit import DrivenFit
-from wristctl.identification.driven_forward import STEP, DrivenArc, _softening, courses_of_pulls
+from wristctl.identification.driven_forward import STEP, _softening, courses_of_pulls, driven_arc
 from wristctl.identification.driven_log import _at, drive_of_log, driven_robot
 from wristctl.identification.measured_trials import places_of_log
 from wristctl.identification.ratios import ratios_of_driven, wrist_by_ratios
@@ -57,8 +57,9 @@ def made(angles: Array, told: Pulls, time: Array, newtons: Array | float = 1.0, 
     fine = np.arange(0.0, time[-1] + STEP, STEP)
     driven, pulls = told(fine + 0.5 * STEP), told(time)
     places = BELIEVED.tendon_radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    arc = DrivenArc(DAMPING, INERTIA, places, np.full(len(angles), 1.0 / STIFFNESS))
-    ((_, course),) = courses_of_pulls([arc], BELIEVED, driven)
+    values = {"damping": DAMPING, "inertia": INERTIA}
+    arc = driven_arc(BELIEVED, values, places, np.full(len(angles), 1.0 / STIFFNESS))
+    (course,) = courses_of_pulls([arc], driven)
     seen = np.stack([np.interp(time - DELAY, fine, one) for one in course.T], axis=1)
     rng = np.random.default_rng(1)
     bends = seen[:, :2] + noise * rng.standard_normal((len(time), 2))

@@ -144,7 +144,7 @@ def test_transitions_and_networks_are_read_back_whole(tmp_path: Any) -> None:
     state = np.random.default_rng(0).normal(size=(3, 5, 2))
     np.testing.assert_array_equal(load_dynamics(file).acceleration(*state), dynamics.acceleration(*state))
     file.write_bytes(file.read_bytes()[:-8])
-    with pytest.raises(UserError, match="not a network of a wrist's dynamics"):
+    with pytest.raises(UserError, match="not a readable safetensors file"):
         load_dynamics(file)
 
 

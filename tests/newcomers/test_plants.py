@@ -25,8 +25,7 @@ from wristctl.lanes.compiled import _BODIES, sources
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, poses
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
+from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel
 
 __all__ = ["host_on"]  # a fixture of the bench's tests
 HERE = Path(__file__).parent
@@ -71,25 +70,11 @@ def some(model: PlantModel, count: int = 9) -> np.ndarray:
     return drawn
 
 
-@pytest.mark.slow
-def test_the_jacobian_is_the_derivative_of_the_tip(model: PlantModel) -> None:
-    q, small = some(model), 1e-6
-    found = poses(model, WRIST, 2, q).jacobian
-    for k in range(q.shape[1]):
-        nudge = small * np.eye(q.shape[1])[k]
-        ahead, behind = (poses(model, WRIST, 2, q + side * nudge) for side in (1.0, -1.0))
-        np.testing.assert_allclose(found[:, :2, k], (ahead.tip - behind.tip) / (2.0 * small), atol=1e-9)
-        np.testing.assert_allclose(found[:, 2, k], (ahead.angle - behind.angle) / (2.0 * small), atol=1e-9)
-
-
-def test_compiled_and_plain_functions_say_the_same_of_tip_and_backbone(model: PlantModel) -> None:
+def test_the_backbone_ends_at_the_tip_along_the_angle(model: PlantModel) -> None:
     q = some(model)
-    found = poses(model, WRIST, 2, q)
-    np.testing.assert_allclose(found.tip, model.tips(WRIST, q), atol=1e-14)
-    np.testing.assert_allclose(found.angle, model.angle(q), atol=1e-14)
-    for own, tip, angle in zip(q, found.tip, found.angle, strict=True):
+    for own, (x, y), angle in zip(q, model.tips(WRIST, q), model.angle(q), strict=True):
         line, along = model.backbone(WRIST, own, np.array([0.0, WRIST.length]))
-        np.testing.assert_allclose(line, [0.0, tip[0] + 1j * tip[1]], atol=1e-14)
+        np.testing.assert_allclose(line, [0.0, x + 1j * y], atol=1e-14)
         assert along[-1] == pytest.approx(np.exp(1j * angle), abs=1e-14)
 
 
@@ -127,15 +112,11 @@ def test_elastic_tendons_begin_at_pretension_and_a_held_wrist_stays(model: Plant
         np.testing.assert_allclose(done.column(f"acting_{side}", 0), WRIST.pretension, atol=step)
 
 
-def test_the_tips_speed_is_the_jacobian_times_the_coordinates_rate(model: PlantModel) -> None:
+def test_compiled_and_plain_functions_say_the_same_of_the_angle_and_its_rate(model: PlantModel) -> None:
     done = run(model, loaded(0.2))
-    q = done.coordinates(0)[::20]
-    found = poses(model, WRIST, cut(model), q)
-    rate = np.gradient(done.coordinates(0), 1e-3, axis=0)[::20]
-    speed = np.einsum("tik,tk->ti", found.jacobian, rate)
-    expected = np.gradient(model.tips(WRIST, done.coordinates(0)), 1e-3, axis=0)[::20]
-    np.testing.assert_allclose(speed[1:-1, :2], expected[1:-1], atol=1e-6)
-    np.testing.assert_allclose(speed[1:-1, 2], done.column("rate", 0)[::20][1:-1], atol=1e-3)
+    angle = model.angle(done.coordinates(0))
+    np.testing.assert_allclose(done.column("theta", 0), angle, atol=1e-14)
+    np.testing.assert_allclose(done.column("rate", 0)[1:-1], np.gradient(angle, 1e-3)[1:-1], atol=1e-3)
 
 
 def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it_was(model: PlantModel) -> None:
@@ -151,8 +132,8 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
     assert np.isfinite(theta).all() and (theta[-1] == theta[-100]).all()
 
 
-# Tendons that no plant in one plane has.
-IN_SPACE = {*(plant.parameters for plant in PLANTS_IN_SPACE.values()), PulledPlaces, ElasticPlaces, RealPlaces}
+# What no plant in one plane is made of.
+IN_SPACE = {plant.parameters for plant in PLANTS_IN_SPACE.values()}
 
 
 def _reached(functions: Iterable[CPUDispatcher], others: Collection[type]) -> set[Path]:

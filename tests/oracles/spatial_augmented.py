@@ -1,6 +1,6 @@
 """The paper's augmented form in two planes: each segment as a rigid chain, the readable reference in NumPy.
 
-As in the plane (`wristctl.wrist.augmented`) a segment turns, slides, slides and turns, and its point mass is between
+As in the plane (`tests.oracles.augmented`) a segment turns, slides, slides and turns, and its point mass is between
 the slides; but a turn is now by a rotation vector across the tangent, half of the segment's: rho/2 with rho = (0, -u_z,
 u_y), and a slide is d = l/2 S(|u|/2), S(x) = sin(x)/x, along the chord. So the joints of a segment are mu = (u/2, d, d,
 u/2), six numbers, and J_mu = d(mu)/du reduces them to two. A turn's axes are the columns of the rotation vector's

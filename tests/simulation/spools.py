@@ -12,13 +12,13 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.nonideal import inner_of, nonideal_of, spools_after_slip, unmoved
+from wristctl.simulation.nonideal import faults_of_sides, inner_of, nonideal_of, spools_after_slip, unmoved
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, travel
 from wristctl.wrist.segments import segments
-from wristctl.wrist.tendon_mechanics import RealTendons, Z, pulls_along, read_nonideal, row_of, spool_pull
+from wristctl.wrist.tendon_mechanics import RealTendons, Z, pulls_along, read_faults, read_nonideal, row_of, spool_pull
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()
@@ -57,7 +57,8 @@ def _spooled(
     model: Any,
     parameters: Any,
     values: Any,
-    stiffness: float,
+    faults: Any,
+    stiffness: Any,
     reeled: Any,
     state: Any,
     memory: Any,
@@ -68,7 +69,10 @@ def _spooled(
 ) -> None:
     segment, n = parameters_of(model, rows_of(parameters)), len(cut)
     zero = zero_like(segment.length)
-    tendons = RealTendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory), inner_in_lanes(inner))
+    tendons = RealTendons(
+        part(rows_of(stiffness), 0, (0, 0)), read_nonideal(rows_of(values)), read_faults(rows_of(faults), (0, 0)),
+        rows_of(memory), inner_in_lanes(inner), (0, 0), (0, 0, 0),
+    )  # fmt: skip
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive, before = 1.0 + zero, (reeled[0, 0] + zero, reeled[0, 1] + zero)
     given = lanes_like(part(rows_of(values), 0, (0, 0)))
@@ -101,17 +105,19 @@ def spooled(
     force: float = 0.0,
 ) -> Spooled:
     """From straight, where both sides' spools have reeled in (T, 2) [m], in steps of h [s]."""
-    values = np.array(nonideal_of(plant or TrueWrist(), actuator, facts or TrueActuator(), h))
+    values = nonideal_of(plant or TrueWrist(), actuator, facts or TrueActuator(), h)
+    faults = faults_of_sides(values, 2).ravel()
     memory, out = (
         unmoved(np.array(reeled[0]), np.zeros(3), np.zeros(2), np.zeros(n)),
         np.empty((len(reeled), len(Spooled._fields))),
     )
     state = np.concatenate([np.zeros(n), np.zeros(n) if rate is None else rate])
     parameters = segments(wrist or WristParameters(), n, (0.0, force))
-    stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness
+    stiffness = np.full(2, TENDONS_PER_SIDE * actuator.tendon_stiffness)
     move = kernel_of(_spooled, PCC)
     inner = inner_of([plant or TrueWrist()], np.zeros((1, n)), np.zeros(1), lambda rows: rows[0])
-    move(PCC, parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, inner, out, h, (0,) * n)
+    given = np.ascontiguousarray(reeled)
+    move(PCC, parameters, np.array(values), faults, stiffness, given, state, memory, inner, out, h, (0,) * n)
     return Spooled(*out.T)
 
 

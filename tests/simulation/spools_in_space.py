@@ -16,9 +16,8 @@ from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import spatial_values
-from wristctl.wrist.spatial.spooled_tendons import RealPlaces, read_faults
 from wristctl.wrist.tendon_layout import TendonLayout
-from wristctl.wrist.tendon_mechanics import acting_pulls, read_nonideal
+from wristctl.wrist.tendon_mechanics import RealTendons, acting_pulls, read_faults, read_nonideal
 
 
 class Wrist(NamedTuple):
@@ -60,9 +59,10 @@ class _Values(NamedTuple):
 
 def _move(model: Any, values: Any, reeled: Any, motion: Any, out: Any, h: float, cut: Any, pulls: Any) -> None:
     plant, m, count = parameters_of(model, rows_of(values.wrist), pulls), len(cut), len(pulls)
-    tendons = RealPlaces(
+    tendons = RealTendons(
         part(rows_of(values.stiffness), 0, pulls), read_nonideal(rows_of(values.nonideal)),
         read_faults(rows_of(values.faults), pulls), rows_of(values.state), inner_in_lanes(values.inner), pulls,
+        pulls + pulls,
     )  # fmt: skip
     q, rate = part(rows_of(motion), 0, cut), part(rows_of(motion), m, cut)
     turned, speeds = lanes_like(tendons.stiffness), lanes_like(tendons.stiffness)

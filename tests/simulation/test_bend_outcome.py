@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from tests.oracles.course_metrics import of_course
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.closed_loop import follow, trajectory
-from wristctl.simulation.metrics import METRICS, metrics_in, of_course
+from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion

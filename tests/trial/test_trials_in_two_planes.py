@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from tests.oracles.course_metrics import of_course
 from tests.trial.conftest import WRIST, Done
 from tests.trial.in_two_planes import CIRCLING, PLANES, THREE, THREE_AT_ZERO, circling, performed, rmse, true_errors
 from wristctl.commands.adoption import with_planes
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
-from wristctl.simulation.metrics import of_course
 from wristctl.simulation.motion import Motion
 from wristctl.study_files.load import load_study
 from wristctl.trial.homing import Zero

@@ -33,7 +33,8 @@ def held(angle: np.ndarray, friction: float, sheath: float, n: int = 4) -> tuple
     found = equilibria_at(values, n, angle, 2.0 * WRIST.pretension)
     taut = terms(values, found.theta, 0.0 * found.theta).tendon_lengths.sum(axis=1)
     reeled = found.pulls / SIDE + WRIST.length - taut
-    return values, HeldTendons(reeled, *(np.full(count, each) for each in (SIDE, friction, sheath))), found.theta
+    tendons = HeldTendons(reeled, np.full((count, 1), SIDE), np.full(count, friction), np.full(count, sheath))
+    return values, tendons, found.theta
 
 
 @pytest.mark.filterwarnings("ignore:The iteration is not making", "ignore:xtol=")  # MINPACK, at the last digits

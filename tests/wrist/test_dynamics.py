@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.augmented import equation_of_motion, tendon_columns
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist import augmented
-from wristctl.wrist.compiled_model import integrate, linearised, terms
+from wristctl.wrist.augmented import joints
+from wristctl.wrist.compiled_model import linearised, terms
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import Segments, segments
 
 WRIST = WristParameters()
+moved = partial(integrate, PCC)
 ANGLE = np.deg2rad(WRIST.range_deg)
 
 
@@ -27,7 +33,7 @@ def test_fast_form_equals_the_papers_augmented_form(n: int) -> None:
     values = segments(wrist, n)
     for seed in range(5):
         theta, rate = random_state(n, seed)
-        mass, coriolis, gravity, _, pose = augmented.equation_of_motion(Segments(*values), theta, rate)
+        mass, coriolis, gravity, _, pose = equation_of_motion(Segments(*values), theta, rate)
         fast = terms(values, theta, rate)
         np.testing.assert_allclose(fast.mass, mass, rtol=1e-10, atol=1e-14)
         np.testing.assert_allclose(fast.bias, coriolis @ rate + gravity, rtol=1e-10, atol=1e-12)
@@ -38,7 +44,7 @@ def test_fast_form_equals_the_papers_augmented_form(n: int) -> None:
 def test_tip_force_enters_by_the_transposed_jacobian(n: int) -> None:
     theta, rate = random_state(n, 7)
     free, loaded = segments(WRIST, n), segments(WRIST, n, force=(1.3, -0.7))
-    jacobian = augmented.equation_of_motion(Segments(*free), theta, rate)[3]
+    jacobian = equation_of_motion(Segments(*free), theta, rate)[3]
     change = terms(loaded, theta, rate).bias - terms(free, theta, rate).bias
     np.testing.assert_allclose(change, -jacobian.T @ [1.3, -0.7], rtol=1e-12, atol=1e-15)
 
@@ -48,10 +54,10 @@ def test_tendon_arms_agree_with_the_augmented_columns(n: int) -> None:
     theta, rate = random_state(n, 3)
     wrist = WRIST.model_copy(update={"discs": n + 1})  # one span per segment
     values = Segments(*segments(wrist, n))
-    mu, jacobian, _ = augmented.joints(theta, values.length)
+    mu, jacobian, _ = joints(theta, values.length)
     arms = terms(np.array(values), theta, rate).moment_arms
     for k in range(n):
-        columns = augmented.tendon_columns(mu[4 * k : 4 * k + 4], values.tendon_offset)
+        columns = tendon_columns(mu[4 * k : 4 * k + 4], values.tendon_offset)
         np.testing.assert_allclose(arms[k], jacobian[4 * k : 4 * k + 4, k] @ columns, rtol=1e-12)
 
 
@@ -79,7 +85,7 @@ def test_mass_matrix_is_symmetric_and_positive_definite_over_the_range(n: int, d
 def test_rate_of_mass_matrix_less_twice_coriolis_is_skew(n: int) -> None:
     theta, rate = random_state(n, 11)
     values = Segments(*segments(WRIST, n))
-    coriolis = augmented.equation_of_motion(values, theta, rate)[1]
+    coriolis = equation_of_motion(values, theta, rate)[1]
     h = 1e-6
     ahead, behind = (terms(np.array(values), theta + s * h * rate, rate).mass for s in (1, -1))
     skew = (ahead - behind) / (2 * h) - 2 * coriolis
@@ -111,8 +117,8 @@ def test_segments_of_equal_angle_form_one_arc() -> None:
 def test_left_is_the_mirror_of_right() -> None:
     values = segments(WRIST, 4)
     still, times = np.zeros(4), np.arange(1, 11) * 0.1
-    right = integrate(values, still, still, [30.0, 4.0], times)[0]
-    left = integrate(values, still, still, [4.0, 30.0], times)[0]
+    right = moved(values, still, still, [30.0, 4.0], times)[0]
+    left = moved(values, still, still, [4.0, 30.0], times)[0]
     np.testing.assert_allclose(right, -left, rtol=0, atol=1e-13)
     assert np.abs(right).max() > 0.1
 
@@ -137,7 +143,7 @@ def test_energy_is_conserved_without_damping_to_the_integrators_order(n: int) ->
     before = energy(values, theta, rate)
     drift = []
     for h in (4e-4, 2e-4, 1e-4):
-        late, late_rate = integrate(values, theta, rate, [0.0, 0.0], [0.5], h)
+        late, late_rate = moved(values, theta, rate, [0.0, 0.0], [0.5], h)
         drift.append(abs(energy(values, late[-1], late_rate[-1]) - before))
     assert drift[-1] < 1e-6 * before
     assert drift[0] / drift[1] > 6.0 and drift[1] / drift[2] > 6.0
@@ -147,13 +153,11 @@ def test_energy_is_conserved_without_damping_to_the_integrators_order(n: int) ->
 def test_integrator_converges_with_third_order(n: int) -> None:
     values = segments(WRIST, n)
     still = np.zeros(n)
-    fine = integrate(values, still, still, [25.0, 4.0], [0.08], 1e-5)[0]
-    errors = [
-        np.abs(integrate(values, still, still, [25.0, 4.0], [0.08], h)[0] - fine).max() for h in (4e-3, 2e-3, 1e-3)
-    ]
+    fine = moved(values, still, still, [25.0, 4.0], [0.08], 1e-5)[0]
+    errors = [np.abs(moved(values, still, still, [25.0, 4.0], [0.08], h)[0] - fine).max() for h in (4e-3, 2e-3, 1e-3)]
     assert all(errors[i] / errors[i + 1] > 5.0 for i in range(2)), errors
 
 
 def test_times_between_steps_are_refused() -> None:
     with pytest.raises(ValueError, match="whole numbers of steps"):
-        integrate(segments(WRIST, 1), [0.0], [0.0], [1.0, 1.0], [0.0105], 1e-3)
+        moved(segments(WRIST, 1), [0.0], [0.0], [1.0, 1.0], [0.0105], 1e-3)

@@ -10,17 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.oracles.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
+from tests.oracles.spatial_energy import spatial_energy
 from tests.wrist.turned_in_space import turned
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.wrist import compiled_model, statics
+from wristctl.wrist import statics
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_frames, spatial_tips
-from wristctl.wrist.spatial.spatial_model import spatial_integrate, spatial_linearised, spatial_terms
+from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, ellipse, spatial_values
 from wristctl.wrist.spatial.spatial_statics import (
     least_spatial_stiffness,
-    spatial_energy,
     spatial_equilibrium,
     spatial_stiffness,
 )
@@ -161,11 +164,11 @@ def test_in_one_plane_it_is_the_planar_wrist(plane: str) -> None:
     planar, spatial, own = of_plane(plane)
     times = np.arange(0.02, 1.01, 0.02)
     pulls, start, rate = np.array([5.0, 31.0]), np.array([0.3, -0.5]), np.array([2.0, -4.0])
-    theta, omega = compiled_model.integrate(planar, start, rate, pulls, times)
+    theta, omega = integrate(PCC, planar, start, rate, pulls, times)
     q, speed = np.zeros(2 * N), np.zeros(2 * N)
     q[own], speed[own] = start, rate
     each = 0.5 * pulls[[1, 1, 0, 0]]
-    bent, moving = spatial_integrate(spatial, q, speed, each, times)
+    bent, moving = integrate(PCC_IN_SPACE, spatial, q, speed, each, times)
     np.testing.assert_allclose(bent[:, own], theta, atol=1e-12)
     np.testing.assert_allclose(moving[:, own], omega, atol=1e-11)
     np.testing.assert_allclose(bent[:, slice(1 - own.start, None, 2)], 0.0, atol=1e-13)
@@ -180,13 +183,13 @@ def test_turning_everything_about_the_tangent_turns_the_motion(
     """The ellipse of stiffness turns with it."""
     turn = np.array([[np.cos(by), -np.sin(by)], [np.sin(by), np.cos(by)]])
     times = [0.02, 0.1]
-    end, speed = spatial_integrate(VALUES, q, rate, pulls, times)
+    end, speed = integrate(PCC_IN_SPACE, VALUES, q, rate, pulls, times)
 
     def aside(pairs: np.ndarray) -> np.ndarray:
         return (pairs.reshape(-1, 2) @ turn.T).reshape(pairs.shape)
 
-    end_aside, speed_aside = spatial_integrate(
-        turned(SpatialSegments._fields, VALUES, by), aside(q), aside(rate), pulls, times
+    end_aside, speed_aside = integrate(
+        PCC_IN_SPACE, turned(SpatialSegments._fields, VALUES, by), aside(q), aside(rate), pulls, times
     )
     np.testing.assert_allclose(end_aside, aside(end), atol=1e-12)
     np.testing.assert_allclose(speed_aside, aside(speed), atol=1e-10)
@@ -211,7 +214,7 @@ def test_energy_stays_without_damping_and_falls_with_it(damped: bool) -> None:
     q, rate, pulls = np.array([0.4, -0.2, 0.1, 0.3]), np.array([3.0, 5.0, -2.0, 4.0]), np.array([12.0, 3.0, 8.0, 20.0])
     times, drift = np.arange(0.01, 0.1, 0.01), []
     for h in (1e-4, 5e-5):
-        bent, moving = spatial_integrate(values, q, rate, pulls, times, h)
+        bent, moving = integrate(PCC_IN_SPACE, values, q, rate, pulls, times, h)
         energy = spatial_energy(values, np.vstack([q, bent]), np.vstack([rate, moving]), pulls)
         drift.append(np.abs(energy - energy[0]).max())
     if damped:
@@ -223,7 +226,7 @@ def test_energy_stays_without_damping_and_falls_with_it(damped: bool) -> None:
 @pytest.mark.parametrize("pulls", [(2.0, 2.0, 29.0, 2.0), (6.0, 15.0, 2.0, 4.0)])
 def test_a_long_time_ends_at_the_equilibrium(pulls: tuple[float, ...]) -> None:
     rest = spatial_equilibrium(VALUES, N, pulls)
-    end, speed = spatial_integrate(VALUES, np.zeros(2 * N), np.zeros(2 * N), pulls, [20.0])
+    end, speed = integrate(PCC_IN_SPACE, VALUES, np.zeros(2 * N), np.zeros(2 * N), pulls, [20.0])
     np.testing.assert_allclose(end[0], rest, atol=1e-9)
     np.testing.assert_allclose(speed[0], 0.0, atol=1e-8)
     assert np.abs(rest).max() > 0.1

@@ -13,10 +13,12 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.compiled_model import integrate, terms
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import integrate
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.statics import equilibrium, least_stiffness, stiffness
-from wristctl.wrist.tendons import allocate, reach, torque_of
+from wristctl.wrist.tendons import allocate, moment_arms, reach
 
 WRIST = WristParameters()
 
@@ -28,7 +30,8 @@ def _allocate(parameters: Any, asked: Any, out: Any) -> None:
     plus, minus = allocate(row[0], wrist, row[1], row[2], row[3])
     result[2] = plus
     result[3] = minus
-    result[4] = torque_of(row[0], wrist, plus, minus)
+    arms = moment_arms(wrist, row[0])
+    result[4] = arms[0] * plus + arms[1] * minus
 
 
 def allocated(theta: float, torque: float, low: float, high: float) -> np.ndarray:
@@ -80,7 +83,7 @@ def test_tendons_that_span_the_whole_wrist_at_once_would_buckle_it() -> None:
 def test_equilibrium_is_where_the_motion_ends(n: int) -> None:
     still = np.zeros(n)
     at_rest = equilibrium(WRIST, n, (8.0, 2.0))
-    late = integrate(segments(WRIST, n), still, still, [16.0, 4.0], [15.0])[0][-1]
+    late = integrate(PCC, segments(WRIST, n), still, still, [16.0, 4.0], [15.0])[0][-1]
     np.testing.assert_allclose(at_rest, late, rtol=0, atol=1e-9)
     assert at_rest.sum() > 0.1
 

@@ -13,13 +13,12 @@ from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting_in_space
-from wristctl.simulation.nonideal import faults_of, inner_of, nonideal_of, of_tendons, unmoved
+from wristctl.simulation.nonideal import faults_of, faults_of_sides, inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
 from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import IN_PLANE, across_of
 from wristctl.wrist.plant import kernel_of, plant_in
-from wristctl.wrist.spatial.spooled_tendons import RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 from wristctl.wrist.tendon_mechanics import PLAY, RealTendons, X
 
@@ -113,13 +112,14 @@ class SpatialLoad(Load):
     ) -> None:
         super().__init__(settings, wrist, stream, 2, len(TendonLayout.of(_wound(wrist)).places), substeps)
         motors, alike, q = settings.actuator, np.ones(self.wound), self._state[: self.coordinates]
-        tendons = RealPlaces(
+        tendons = RealTendons(
             stiffness=motors.tendon_stiffness * alike,
             nonideal=np.array(nonideal_of(self._own, motors, motors, PERIOD / substeps)),
             faults=faults_of(motors, motors, alike, "bench.actuator").ravel(),
             state=unmoved(spools.reeled[: self.wound], np.zeros(2 * self.wound), np.zeros(self.wound), q),
             inner=inner_of([self._own], q[None], np.zeros(1), lambda rows: rows[0], 2),
             pulls=self._hanging.pulls,
+            path=(0,) * (2 * self.wound),
         )
         self._hanging = self._hanging._replace(tendons=tendons)
         self._weigh()
@@ -139,11 +139,15 @@ class PlanarLoad(Load):
     ) -> None:  # fmt: skip
         super().__init__(settings, wrist, stream, 1, AXES)
         motors, q, self._positive = settings.actuator, self._state[: self.coordinates], positive
+        nonideal = nonideal_of(self._own, motors, motors, PERIOD, alike=1)
         tendons = RealTendons(
-            stiffness=np.array([motors.tendon_stiffness]),
-            nonideal=np.array(nonideal_of(self._own, motors, motors, PERIOD, alike=1)),
+            stiffness=np.full(AXES, motors.tendon_stiffness),
+            nonideal=np.array(nonideal),
+            faults=faults_of_sides(nonideal, AXES).ravel(),
             state=unmoved(spools.reeled, np.zeros(3), np.zeros(AXES), q),
             inner=NoInnerFriction(),
+            pulls=self._hanging.pulls,
+            path=(0,) * 3,
         )
         self._hanging = self._hanging._replace(tendons=tendons)
         self._face("ulnar", spools)

@@ -208,7 +208,7 @@ def _taut_at(spools: Any, axis: int, stiffness: float) -> float:
 class Hanging(NamedTuple):
     """Load of the motors: plant, tendons, and what bends across the plane.
 
-    The plant (its model and the values of its parameters), its tendons (RealTendons in one plane, RealPlaces in two),
+    The plant (its model and the values of its parameters), its tendons (RealTendons),
     the stiffness of one [N/m] and the axis that winds each; what bends across the plane (`Across`) against friction
     inside the wrist: its torque [N m], and one over the bend in which it turns round [1/rad]; the motors, steps of the
     integration in a period; and tuples with an entry, of no meaning, for each coordinate and tendon.

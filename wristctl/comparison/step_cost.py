@@ -33,7 +33,7 @@ def _steps(law: Any, count: int, now: Any, wrist: Any, limits: Any, gains: Any, 
     torque = lanes_like(part(bound, 0, (0,)))
     arms = lanes_like(part(bound, 0, (0, 0)))
     for _ in range(count):
-        arms[0], arms[1] = moment_arms(view.theta, segment_rows)
+        arms[0], arms[1] = moment_arms(segment_rows, view.theta)
         law(
             view, wrist_of(wrist), rows_of(gains), rows_of(memory), beyond(arms, 0), bound, beyond(bound, 2),
             beyond(torque, 0),

@@ -8,7 +8,7 @@ from the last to the first: so of two products it is the first that fuses with i
 from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import planar, where, zero_like
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_at, rows_of, square_like
@@ -70,7 +70,6 @@ class Places(NamedTuple):
 @by_type
 def belief_in_lanes(belief: Any) -> Any:
     """A Belief in lanes from one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(belief_in_lanes, Sides)
@@ -88,12 +87,11 @@ def _places_in_lanes(belief: Any) -> Any:
 @by_type
 def moment_arms_at(wrist: Any, bend: Any, arms: Any) -> None:
     """Write the moment arms [m] of a wrist of one segment that is bent like this [rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(moment_arms_at, Segments)
 def _arms_of_sides(wrist: Any, bend: Any, arms: Any) -> None:
-    arms[0], arms[1] = moment_arms(bend[0], wrist)
+    arms[0], arms[1] = moment_arms(wrist, bend[0])
 
 
 @implements(moment_arms_at, SpatialWrist)
@@ -104,12 +102,11 @@ def _arms_of_places(wrist: Any, bend: Any, arms: Any) -> None:
 @by_type
 def lengths_at(wrist: Any, bend: Any, out: Any) -> None:
     """Write the lengths of the tendons' paths [m] through a wrist of one segment that is bent like this [rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(lengths_at, Segments)
 def _lengths_of_sides(wrist: Any, bend: Any, out: Any) -> None:
-    out[0], out[1] = lengths(bend[0], wrist)
+    out[0], out[1] = lengths(wrist, bend[0])
 
 
 @implements(lengths_at, SpatialWrist)
@@ -120,7 +117,6 @@ def _lengths_of_places(wrist: Any, bend: Any, out: Any) -> None:
 @by_type
 def straight_at(wrist: Any, t: int) -> Any:
     """Length of a tendon's path through the straight wrist [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(straight_at, Segments)
@@ -139,7 +135,6 @@ def coupling(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any, ext
 
     It is what the one-segment model in two planes asks for beyond each plane's own.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(coupling, Ignored)
@@ -153,7 +148,7 @@ def _compensated(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any,
     segment, zero = known.wrist.segment, zero_like(bend[0])
     posture, momenta, mass, free = posture_like(bend), momenta_like(bend), square_like(bend), lanes_like(bend)
     free[0], free[1] = zero, zero
-    tangent = bend_segments(segment, bend, posture)
+    tangent, _, _ = bend_segments(segment, bend, posture)
     spatial_mass_matrix(segment, posture, tangent, mass, momenta)
     spatial_bias(segment, bend, rate, posture, tangent, free, extra)
     inertia_y, load_y = one_segment(load_segments(rows_at(known.models, 0)), bend[0], rate[0])
@@ -166,7 +161,6 @@ def _compensated(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any,
 @by_type
 def coupled(kind: Any, torque: Any, extra: Any) -> Any:
     """A law's torque with what the planes do to each other [N m]; where that is ignored, the torque to the last bit."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(coupled, Ignored)
@@ -230,7 +224,6 @@ def share_out(wrist: Any, arms: Any, wanted: Any, reached: Any, pulls: Any) -> A
 
     In one plane that is 1, or 0 where the torque is out of reach.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(share_out, Segments)
@@ -257,12 +250,9 @@ def miss(wrist: Any, wanted: Any, torque: Any, reached: Any, missed: Any) -> Non
 
     One plane has no other, and misses nothing.
     """
-    raise NotImplementedError("compiled code only")
 
 
-@implements(miss, Segments)
-def _miss_nothing(wrist: Any, wanted: Any, torque: Any, reached: Any, missed: Any) -> None:
-    pass
+implements(miss, Segments)(nothing)
 
 
 @implements(miss, SpatialWrist)

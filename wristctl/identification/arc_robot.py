@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
 from wristctl.wrist.quasistatic_arcs import SMOOTH, QuasistaticArcs
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
@@ -210,6 +211,11 @@ ABSENT = {
     "creep_time": 1.0, "damping": 0.0, "inertia": 0.0,
 }  # fmt: skip
 """Values of unknowns that have no effect."""
+
+
+def inertia_of_arc(wrist: WristParameters) -> float:
+    """Inertia of bending as one arc, at the straight wrist [kg m^2]."""
+    return wrist.mass * wrist.length**2 / 20.0 + wrist.hand_mass * (0.5 * wrist.length + wrist.hand_offset) ** 2
 
 
 def _of_arc(values: Mapping[str, Array], name: str, arc: int, ones: Array) -> Array:

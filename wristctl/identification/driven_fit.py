@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,15 +13,14 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import ArcFit
 from wristctl.identification.arc_robot import ArcRecording
-from wristctl.identification.driven_log import driven_robot, recordings_of
+from wristctl.identification.driven_log import driven_robot
 from wristctl.identification.driven_robot import DrivenRobot
+from wristctl.identification.log_model import everything_fitted
 from wristctl.identification.model_choice import TriedModel, chosen_of, tried_models, whole_fit
 from wristctl.records.open_log import OpenLog
 
 LEAST = 0.1
 """Error of the part that was not fitted over its motion, beyond which nothing is identified."""
-# Time at the begin of another log that gives its zero [s].
-_ZEROED = 2.0
 
 
 @dataclass(frozen=True)
@@ -68,16 +67,5 @@ def fitted_logs(
     robot, recordings, remarks = driven_robot(logs, wrist, settings)
     models = list(tried_models(robot, [recordings], False, told=told))
     chosen = chosen_of(models)
-    whole = [replace(one, fitted=one.fitted | one.asked, asked=np.zeros(len(one.time), bool)) for one in recordings]
-    fit = whole_fit(models, whole)
+    fit = whole_fit(models, everything_fitted(recordings))
     return DrivenFit(fit, tuple(models), chosen, tuple(recordings), tuple(remarks), sum(map(len, logs)))
-
-
-def predicted(found: DrivenFit, log: OpenLog) -> tuple[float, float]:
-    """RMS error of another log's bends and their motion [rad]; its begin gives its zero."""
-    (recording,) = recordings_of([log], found.robot)
-    begin = recording.time < recording.time[0] + _ZEROED
-    nothing = np.zeros(len(begin), bool)
-    recording = replace(recording, session="another", zeroing=begin, fitted=nothing, asked=~begin)
-    asked = found.fit.asked_of(recording)
-    return asked.rms("asked"), motion_of([recording.measured[~begin]])

@@ -15,10 +15,10 @@ from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Phrase, Setting, UserError
-from wristctl.identification.arc_robot import ArcRecording
-from wristctl.identification.driven_forward import SETTLE, STEP, inertia_of_arc
+from wristctl.identification.arc_robot import ArcRecording, inertia_of_arc
+from wristctl.identification.driven_forward import STEP
 from wristctl.identification.driven_robot import Drive, DrivenRobot
-from wristctl.identification.log_model import in_parts, mass_of_log
+from wristctl.identification.log_model import SETTLE, in_parts, lines_at, mass_of_log, without_begin
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -94,7 +94,7 @@ def driven_robot(
         remarks.append(f"One ampere is taken as {scale:.3g} N, by identify.torque_constant and identify.spool_radius.")
     if first.tendons_of("current") and quantity == "tension":
         remarks.append("Currents take no part, as the log has tensions.")
-    return robot, [_settled(one) for one in recordings], remarks
+    return robot, [without_begin(one, SETTLE) for one in recordings], remarks
 
 
 def recordings_of(logs: Sequence[OpenLog], robot: DrivenRobot) -> list[ArcRecording]:
@@ -161,7 +161,7 @@ def _recording(
     grid = np.arange(begin, end + STEP, STEP)
     course = np.stack([signs[k] * _at(grid + 0.5 * STEP, clock[told], driven[told, k]) for k in range(len(numbers))], 1)
     rates = np.stack([trial.columns.get(f"rate_{axis}", np.full(len(clock), math.nan)) for axis in "yz"], axis=1)[kept]
-    nothing, at_samples = np.zeros(len(kept), bool), _lines(clock[kept], clock[told], driven[told])
+    nothing, at_samples = np.zeros(len(kept), bool), lines_at(clock[kept], clock[told], driven[told])
     return ArcRecording(
         f"{file}, {name}" if name else file, file, clock[kept], np.array(signs) * at_samples,
         motion[kept], np.diff(clock[kept], prepend=math.nan), nothing, nothing, nothing, np.zeros(len(kept), np.int64),
@@ -178,16 +178,6 @@ def _at(time: Array, clock: Array, column: Array) -> Array:
     if np.mean(steps == 0.0) > _HELD and steps.any():
         return np.asarray(column[np.searchsorted(clock, time, side="right") - 1])
     return np.asarray(CubicSpline(clock, column)(time))
-
-
-def _lines(time: Array, clock: Array, values: Array) -> Array:
-    return np.stack([np.interp(time, clock, column) for column in values.T], axis=1)
-
-
-def _settled(recording: ArcRecording) -> ArcRecording:
-    """Without the begin, at which nobody knows how the wrist came there."""
-    late = recording.time >= recording.time[0] + SETTLE
-    return replace(recording, fitted=recording.fitted & late, asked=recording.asked & late)
 
 
 def _check_motion(recordings: Sequence[ArcRecording], log: OpenLog, quantity: str) -> None:
@@ -214,7 +204,7 @@ def _regression(recordings: Sequence[ArcRecording]) -> tuple[Array, float]:
         for one in recordings:
             assert one.course is not None
             clock, driven = one.course
-            at = np.stack([np.interp(one.time - delay, clock, column) for column in driven.T], axis=1)
+            at = lines_at(one.time - delay, clock, driven)
             rows.append(at - at.mean(axis=0))
             bends.append(one.measured - one.measured.mean(axis=0))
         made, motion = np.concatenate(rows), np.concatenate(bends)

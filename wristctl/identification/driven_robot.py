@@ -17,8 +17,9 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.arc_robot import ABSENT, OF_TERM, UNKNOWNS, ArcRecording, ArcRobot, ArcUnknown, Term
-from wristctl.identification.driven_forward import STEP, DrivenArc, courses_of_pulls
+from wristctl.identification.arc_robot import OF_TERM, UNKNOWNS, ArcRecording, ArcRobot, ArcUnknown, Term
+from wristctl.identification.driven_forward import STEP, courses_of_pulls, driven_arc
+from wristctl.identification.forward import Supposed
 
 Drive = Literal["tension", "current"]
 """What a log has of the tendons: tensions [N], or currents [A] without a torque constant."""
@@ -134,25 +135,20 @@ class DrivenRobot(ArcRobot):
         arcs = [self._arc({name: float(column[v]) for name, column in values.items()}) for v in range(len(zero))]
         delays = values.get("delay", np.zeros(len(zero)))
         seen = np.empty((len(zero), len(recording.time), 4))
-        for v, course in courses_of_pulls(arcs, self.wrist, driven):
+        for v, course in enumerate(courses_of_pulls(arcs, driven)):
             at = recording.time - delays[v]
             seen[v] = np.stack([np.interp(at, clock, column) for column in course.T], axis=1)
         return seen[..., :2] + zero[:, None, :], seen[..., 2:]
 
-    def _arc(self, values: Mapping[str, float]) -> DrivenArc:
+    def _arc(self, values: Mapping[str, float]) -> Supposed:
         """The arc of one variant."""
         directions = [values.get(f"direction_{k}", angle) for k, angle in zip(self.numbers, self.angles, strict=True)]
         gains = self.gains(values)
         radius = self.radius * values.get("arm", 1.0)
         toward = np.stack([np.cos(directions), np.sin(directions)], axis=1)
         arm = 1.0 if self.drive == "tension" else radius
-        others = {name: values.get(name, absent) for name, absent in ABSENT.items()}
-        return DrivenArc(
-            others["damping"], max(others["inertia"], STEP**2), radius * toward,
-            gains / (values["stiffness"] * arm), others["friction"], others["sheath"], others["presliding"],
-            others["inner_friction"], others["inner_presliding"], others["creep"], others["creep_time"],
-            values.get("weight", 0.0),
-        )  # fmt: skip
+        own = {**values, "inertia": max(values.get("inertia", 0.0), STEP**2)}
+        return driven_arc(self.wrist, own, radius * toward, gains / (values["stiffness"] * arm))
 
     def gains(self, values: Mapping[str, float]) -> Array:
         """Gain of each tendon over the mean of those that move (M,)."""

@@ -1,4 +1,4 @@
-"""The forward model: what a wrist on elastic tendons does where its spools are moved as recorded.
+"""The forward model: what a wrist on elastic tendons does where its spools are moved, or pulls kept, as recorded.
 
 Candidates run side by side, one a lane: a Jacobian costs a block or two. Plants, tendons and integrator are the
 simulation's; a wrist whose tendons have places bends in two planes.
@@ -13,13 +13,22 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.rotor_field import Field, Rotors, field_of, motion_of, own_stiffness, turn_rotor
+from wristctl.identification.rotor_field import (
+    Field,
+    Rotors,
+    Winches,
+    field_of,
+    motion_of,
+    own_stiffness,
+    turn_rotor,
+)
 from wristctl.lanes.blocks import one_block, to_blocks, to_rows
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
 from wristctl.simulation.nonideal import (
     faults_of,
+    faults_of_sides,
     inner_of,
     nonideal_of,
     place_after_slip,
@@ -32,14 +41,12 @@ from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import FIELDS, own_values, rows_of_tendons
-from wristctl.wrist.spatial.spooled_tendons import RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import (
     Nonideal,
     RealTendons,
     shortening,
     spool_pull,
-    stiffness_at,
     tendons_in_lanes,
 )
 
@@ -84,6 +91,8 @@ class Supposed(NamedTuple):
     """The motor of one tendon."""
     across: Across | None = None
     """What a wrist in one plane does across it, levers by the tendons' order; None: it stays in the plane."""
+    pulls: tuple[float, ...] = ()
+    """Where a log has pulls in place of lengths, each tendon's [N] for one in its column."""
 
 
 class _Lanes(NamedTuple):
@@ -91,7 +100,6 @@ class _Lanes(NamedTuple):
 
     wrist: Any
     tendons: Any
-    """RealTendons, or RealPlaces in two planes."""
     spools: Any
     """Of each tendon what it has reeled in more [m], its lever across [m], `per_newton` and `per_mass` of its field;
     then `radian` and `decay` of all fields, and Across."""
@@ -100,23 +108,25 @@ class _Lanes(NamedTuple):
 
 
 class _Reeled(NamedTuple):
-    """Lengths on the spools (T, M) [m], held over each step of h [s], after `settle` steps on the first ones."""
+    """Lengths on the spools (T, M) [m], or what stands for pulls, held over each step of h [s], after `settle` steps on
+    the first ones."""
 
     lengths: Any
     h: float
     settle: int
     rotors: Any
-    """Standing or Swinging."""
+    """Standing, Swinging or Winches."""
 
 
 class _Shapes(NamedTuple):
-    """Tuples with an entry, of no meaning, for each coordinate, plane, tendon, pull that is wanted, and tendon that may
-    slip, break or have backlash."""
+    """Tuples with an entry, of no meaning, for each coordinate, plane, tendon, pull and rate that is wanted, and tendon
+    that may slip, break or have backlash."""
 
     cut: Any
     bends: Any
     tendons: Any
     pulls: Any
+    rates: Any
     worn: Any
 
 
@@ -150,8 +160,10 @@ def _follow(model: Any, lanes: Any, reeled: Any, shapes: Any, out: Any) -> None:
                 row[p] = bend[p]
             for t in range(len(shapes.pulls)):
                 row[planes + t] = pulls[t]
+            for p in range(len(shapes.rates)):
+                row[planes + p] = speed[p]
         if planes == 1:
-            advance_across(bent, pulls, levers, across, (zero, zero), stiffness_at(tendons, 0), h)
+            advance_across(bent, pulls, levers, across, (zero, zero), tendons.stiffness[0], h)
         for t in range(len(shapes.worn)):
             on_spools[t] = place_after_slip(tendons, t, on_spools[t], zero, k * h + zero, shortening(path, t))
         alive, _ = advance_or_stop(wrist, q, rate, on_spools, tendons, h + zero, alive)
@@ -171,18 +183,24 @@ read_across = tuple_of(Across)
 
 
 def courses(
-    candidates: Sequence[Supposed], reeled: Array, h: float, n: int, model: PlantModel = PCC, pulls: bool = False
+    candidates: Sequence[Supposed],
+    reeled: Array,
+    h: float,
+    n: int,
+    model: PlantModel = PCC,
+    pulls: bool = False,
+    rates: bool = False,
 ) -> Array:
-    """Bends (count, T, P) [rad] of candidates in P planes at steps of h [s], with `pulls` (count, T, P + M).
+    """Bends (count, T, P) [rad] of candidates in P planes at steps of h [s], with M `pulls` or P `rates` as columns.
 
-    A pull is that of one tendon of each place at its spool [N].
+    A pull is that of one tendon of each place at its spool [N], a rate a bend's [rad/s].
 
     Parameters
     ----------
     candidates : wrists cut into n segments, at first at rest; one that leaves what its plant can be, as by a segment
         bent beyond a full turn, stays where it was
     reeled : lengths that the spools have reeled in since the straight wrist's tendons were taut and free of tension
-        (T, M) [m], held over each step
+        (T, M) [m], held over each step; what stands for their pulls of candidates that have some
     model : plant of a wrist in one plane
     """
     first, tendons, count = candidates[0], reeled.shape[1], len(candidates)
@@ -192,13 +210,14 @@ def courses(
     nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h, alike=1) for each in candidates]
     shapes = _Shapes(
         (0,) * model.coordinates(n), (0,) * model.planes, (0,) * tendons, (0,) * (tendons * pulls),
-        (0,) * (tendons * any(map(wears, nonideal))),
+        (0,) * (model.planes * rates), (0,) * (tendons * any(map(wears, nonideal))),
     )  # fmt: skip
     lanes = _lanes(candidates, nonideal, order, n, model)
-    lengths, rotors = np.ascontiguousarray(reeled[:, order], float), motion_of(first.tendons, first.rotors, h)
+    lengths = np.ascontiguousarray(reeled[:, order], float)
+    rotors = Winches() if first.pulls else motion_of(first.tendons, first.rotors, h)
     follow, driven = kernel_of(_follow, model), _Reeled(lengths, h, round(SETTLE / h), rotors)
     blocks, wide = len(lanes.wrist), lanes.wrist.shape[2:]
-    out = np.empty((blocks, len(reeled), model.planes + tendons * pulls, *wide))
+    out = np.empty((blocks, len(reeled), model.planes * (1 + rates) + tendons * pulls, *wide))
     for block, course in enumerate(out):
         follow(model, one_block(lanes, block), driven, shapes, course)
     course = to_rows(out.reshape(blocks, -1, *wide), count).reshape(count, len(reeled), -1)
@@ -221,18 +240,19 @@ def _lanes(
     for each, imperfect in zip(candidates, nonideal, strict=True):
         alike, field = _alike(each, tendons), field_of(each.tendons, each.rotors)
         *constants, levers = IN_PLANE if each.across is None else each.across
-        taut, fields = each.taut or np.zeros(tendons), (field.per_newton / alike, field.per_mass / alike)
+        taut, fields = each.taut or np.zeros(tendons), (each.pulls or field.per_newton / alike, field.per_mass / alike)
         of_each = np.array([taut, np.resize(levers, tendons), *fields])[:, order]
         spools = [*of_each.ravel(), field.radian, field.decay, *constants, 0.0]
         stiffness = alike * own_stiffness(each.tendons, each.rotors)
-        faults = faults_of(each.tendons, each.facts, alike).ravel()
-        rows.append((_values(each, n, model), stiffness, imperfect, faults, memory, spools))
+        faults = (
+            faults_of_sides(imperfect, tendons) if model.planes == 1 else faults_of(each.tendons, each.facts, alike)
+        )
+        rows.append((_values(each, n, model), stiffness, imperfect, faults.ravel(), memory, spools))
     columns = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
     values, stiffnesses, nonideals, of_faults, memories, of_spools = columns
     at_rest = np.zeros((count, coordinates))
     inner = inner_of([each.plant for each in candidates], at_rest, np.zeros(count), to_blocks, model.planes)
-    places = RealPlaces(stiffnesses, nonideals, of_faults, memories, inner, (0,) * tendons)
-    own = RealTendons(stiffnesses, nonideals, memories, inner) if model.planes == 1 else places
+    own = RealTendons(stiffnesses, nonideals, of_faults, memories, inner, (0,) * tendons, (0,) * len(path))
     return _Lanes(values, own, of_spools, np.zeros((len(values), 2 * coordinates + 2 * tendons + 3, *values.shape[2:])))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.arc_robot import ArcRecording, ArcRobot
+from wristctl.identification.arc_robot import ArcRecording, ArcRobot, inertia_of_arc
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import TENDONS
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -68,19 +68,14 @@ def robot_of_logs(
     if any(_has_tensions(log, numbers) for log in logs):
         base.append("force")
     known_to = {"gain": radius_error}
+    inertia = inertia_of_arc(wrist) / wrist.stiffness  # of a wrist that may be another: it is known to itself
     if timed:
-        known_to["inertia"] = _inertia(wrist)
+        known_to["inertia"] = inertia
     return ArcRobot(
         (wrist.length,), tuple(angles), radius, (1,) * len(numbers), measured, tuple(base),
-        {"gain": 1.0, "turn": 0.0, "delay": 0.03, "inertia": _inertia(wrist)}, known_to, timed, wrist.discs - 1,
+        {"gain": 1.0, "turn": 0.0, "delay": 0.03, "inertia": inertia}, known_to, timed, wrist.discs - 1,
         True, _SMOOTH, widest, ("delay",) if any(log.two_clocks for log in logs) else (),
     )  # fmt: skip
-
-
-def _inertia(wrist: WristParameters) -> float:
-    """Inertia of bending as one arc over the stiffness [s^2], of a wrist that may be another: it is known to itself."""
-    whole = wrist.mass * wrist.length**2 / 20.0 + wrist.hand_mass * (0.5 * wrist.length + wrist.hand_offset) ** 2
-    return whole / wrist.stiffness
 
 
 def _check_alike(logs: Sequence[OpenLog], numbers: Sequence[int]) -> None:
@@ -163,7 +158,7 @@ def plus_side(logs: Sequence[OpenLog]) -> tuple[int, ...] | None:
         spools = np.stack([trial.columns[f"spool_{number}"] for number in numbers], axis=1)
         if not seen.any() or not np.isfinite(spools).any():
             continue
-        reeled, moved = _at(clock[seen], clock, spools), motion[seen]
+        reeled, moved = lines_at(clock[seen], clock, spools), motion[seen]
         reeled, moved = reeled - reeled.mean(axis=0), moved - moved.mean()
         products += np.stack([reeled.T @ moved, np.sum(reeled**2, axis=0), np.full(len(numbers), moved @ moved)], 1)
     sizes = np.sqrt(products[:, 1] * products[:, 2])
@@ -224,8 +219,12 @@ def _settled(recording: ArcRecording) -> ArcRecording:
     """
     if not _begins_in_motion(recording.measured):
         return recording
-    time = recording.time
-    late = time >= time[0] + min(SETTLE, _LONGEST * (time[-1] - time[0]))
+    return without_begin(recording, min(SETTLE, _LONGEST * (recording.time[-1] - recording.time[0])))
+
+
+def without_begin(recording: ArcRecording, lasting: float) -> ArcRecording:
+    """The recording whose first part [s] is neither fitted nor predicted."""
+    late = recording.time >= recording.time[0] + lasting
     return replace(recording, fitted=recording.fitted & late, asked=recording.asked & late)
 
 
@@ -313,7 +312,7 @@ def _recording(
         shortest = max(_SHORTEST, (end - begin) / most, *(float(np.median(np.diff(times))) for times in read))
         time, step = np.linspace(begin, end, 1 + round((end - begin) / shortest), retstep=True)
         pause = np.full(len(time), step)
-        columns = _at(time, clock, motion), _at(time, clock, spools), _at(time, clock, tensions)
+        columns = lines_at(time, clock, motion), lines_at(time, clock, spools), lines_at(time, clock, tensions)
     pause[0] = math.nan
     nothing = np.zeros(len(time), bool)
     measured, reeled, pulls = columns
@@ -323,7 +322,7 @@ def _recording(
     )  # fmt: skip
 
 
-def _at(time: Array, clock: Array, values: Array) -> Array:
+def lines_at(time: Array, clock: Array, values: Array) -> Array:
     """Columns of a log at other times, by lines between the samples that are there; nan where a column is empty."""
     columns = []
     for column in values.T:

@@ -15,7 +15,6 @@ from wristctl.config.plant import Actuator
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, minimum, sin
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.named_tuples import tuple_of
 from wristctl.simulation.nonideal import electrical_turn
 from wristctl.wrist.tendon_mechanics import spool_pull
 
@@ -40,18 +39,14 @@ class Rotors(NamedTuple):
 class Field(NamedTuple):
     """Constants of a place's rotors and their field; lanes.
 
-    Length of tendon in one radian of the field [m], one over the pull that it holds [1/N]; of swinging rotors the
-    inverse of their mass [1/kg], and damping over mass [1/s].
+    Length of tendon in one radian of the field [m], one over the pull that it holds [1/N], or of winches the pull for
+    one that counts; of swinging rotors the inverse of their mass [1/kg], and damping over mass [1/s].
     """
 
     radian: Any
     per_newton: Any
     per_mass: Any
     decay: Any
-
-
-# A Field of lanes from rows of lanes, in compiled code.
-read_field = tuple_of(Field)
 
 
 class Standing(NamedTuple):
@@ -62,6 +57,11 @@ class Swinging(NamedTuple):
     """Rotors that swing about that, in so many substeps of an integration step."""
 
     substeps: int
+
+
+class Winches(NamedTuple):
+    """Motors that keep a pull: each is a spool behind a tendon so soft that nothing the wrist does in a step changes
+    it, reeled in anew before the next one."""
 
 
 def rotors_of(settings: IdentifySettings) -> Rotors:
@@ -123,11 +123,10 @@ def turn_rotor(
 
     Parameters
     ----------
-    counted : lengths [m] at which the field stands at the step's begin and its end
+    counted : lengths [m] at which the field stands at the step's begin and its end; of winches what stands for pulls
     shortened : what its path is shorter by in the middle of the step [m]
     state : rows of place [m] and speed [m/s] of each rotor
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(turn_rotor, Standing)
@@ -143,6 +142,13 @@ def _stand(rotors: Any, field: Any, tendons: Any, counted: Any, state: Any, t: i
     square = share * share
     beyond = 1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0 + square * (105.0 / 3456.0)))
     return spooled - field.radian * (share * square * beyond)
+
+
+@implements(turn_rotor, Winches)
+@compiled
+def _wind(rotors: Any, field: Any, tendons: Any, counted: Any, state: Any, t: int, shortened: Any, h: float) -> Any:
+    _, pull = counted
+    return pull * field.per_newton / tendons.stiffness[t] + shortened
 
 
 @implements(turn_rotor, Swinging)

@@ -17,7 +17,8 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache, partial, wraps
+from inspect import unwrap
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NoReturn, TypeVar, cast
@@ -43,7 +44,7 @@ def frozen_values(function: Callable[..., Any]) -> tuple[bytes, tuple[Path, ...]
     waiting: list[Any] = [function]
     while waiting:
         value = waiting.pop()
-        unwrapped = getattr(value, "py_func", getattr(value, "_defn", value))
+        unwrapped = unwrap(getattr(value, "py_func", getattr(value, "_defn", value)))
         if not isinstance(unwrapped, FunctionType):
             digest.update(_told(value))
         elif id(unwrapped) not in visited:
@@ -291,11 +292,15 @@ def by_type(function: F) -> F:
     is compiled than what a loop has.
     """
 
-    @overload(function, strict=False, jit_options=_OPTIONS)
-    def body(part: Any, *others: Any) -> Any:
-        return _BODIES.get((function, getattr(part, "instance_class", None)))
+    @wraps(function)
+    def declared(*_: Any) -> NoReturn:
+        raise NotImplementedError("compiled code only")
 
-    return function
+    @overload(declared, strict=False, jit_options=_OPTIONS)
+    def body(part: Any, *others: Any) -> Any:
+        return _BODIES.get((declared, getattr(part, "instance_class", None)))
+
+    return cast(F, declared)
 
 
 def implements(declared: Any, *kinds: Any) -> Callable[[F], F]:
@@ -307,6 +312,15 @@ def implements(declared: Any, *kinds: Any) -> Callable[[F], F]:
         return function
 
     return keep
+
+
+def nothing(part: Any, *others: Any) -> None:
+    """Body of what an absent part does."""
+
+
+def itself(part: Any) -> Any:
+    """Body of what gives the part as it is."""
+    return part
 
 
 def kernel(function: F, *extra_sources: Path) -> F:

@@ -161,13 +161,7 @@ def _arcs_in_space(inputs: Any, out: Any) -> None:
 
 def compiled_network(network: Network) -> Timed:
     """The network's bends, one sample after another; scaling is folded into the first and the last layer."""
-    weights, biases = [*network.weights], [*network.biases]
-    weights[0] = weights[0] / network.input_scaler.deviation
-    biases[0] = biases[0] - weights[0] @ network.input_scaler.mean
-    weights[-1] = weights[-1] * network.output_scaler.deviation[:, None]
-    biases[-1] = biases[-1] * network.output_scaler.deviation + network.output_scaler.mean
-    parts = zip(weights, biases, strict=True)
-    packed = np.concatenate([np.concatenate([bias, weight.T.ravel()]) for weight, bias in parts])
+    packed = np.concatenate([np.concatenate([bias, weight.T.ravel()]) for weight, bias in network.folded()])
     sizes, kind = np.array(network.sizes), _ACTIVATIONS.index(network.activation)
     value, result = np.empty(sizes.max()), np.empty(sizes.max())
 

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
+from pydantic import Field, model_validator
 
 from wristctl.arrays import Array
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
-from wristctl.errors import UserError
 from wristctl.learning.network import Network, Scaler
-from wristctl.learning.network_file import ENTRY
+from wristctl.learning.network_file import layers_of, read_layers, write_layers
 from wristctl.learning.transitions import Rows, Transitions
-from wristctl.records.files import replacing
 
 # Largest network that a controller evaluates: three times a period and plane.
 MOST_WEIGHTS = 4000
@@ -129,31 +123,13 @@ def save_dynamics(dynamics: Dynamics, path: Path, training: dict[str, object]) -
             "period": dynamics.period, "training": training,
         }
     )  # fmt: skip
-    tensors = {}
-    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        tensors[f"{layer}.weight"], tensors[f"{layer}.bias"] = np.ascontiguousarray(weight), bias
-    with replacing(path) as temporary:
-        temporary.write_bytes(save(tensors, {ENTRY: header.model_dump_json()}))
+    write_layers(path, network, header.model_dump_json())
 
 
 def load_dynamics(path: Path) -> Dynamics:
     """Read a network. Raises UserError for anything that `save_dynamics` would not have written."""
-    fix = "use code/dynamics.safetensors of a sealed train run, or train again"
-    try:
-        with safe_open(path, "numpy") as file:
-            names = file.keys()
-            header = _Header.model_validate_json((file.metadata() or {})[ENTRY])
-            tensors = {name: file.get_tensor(name) for name in names}
-        sizes = (3 * header.planes, *header.hidden, header.planes)
-        weights = tuple(tensors[f"{layer}.weight"] for layer in range(len(sizes) - 1))
-        biases = tuple(tensors[f"{layer}.bias"] for layer in range(len(sizes) - 1))
-    except (SafetensorError, OSError, KeyError, ValidationError, json.JSONDecodeError) as error:
-        raise UserError("not a network of a wrist's dynamics", str(path), fix) from error
-    shapes = [(weight.shape, bias.shape) for weight, bias in zip(weights, biases, strict=True)]
-    if shapes != [((out, into), (out,)) for into, out in pairwise(sizes)]:
-        raise UserError("the arrays of this network are not of the sizes that its header says", str(path), fix)
-    if not all(np.isfinite(values).all() for values in (*weights, *biases)):
-        raise UserError("this network holds numbers that are not finite", str(path), fix)
+    header, tensors = read_layers(path, _Header)
+    weights, biases = layers_of(path, tensors, (3 * header.planes, *header.hidden, header.planes))
     scalers = (
         Scaler(np.array(header.input_mean), np.array(header.input_deviation)),
         Scaler(np.array(header.output_mean), np.array(header.output_deviation)),

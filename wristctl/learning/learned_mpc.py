@@ -156,13 +156,7 @@ def _compilable(dynamics: Dynamics) -> tuple[Any, Any]:
     Scaling is folded into the first and the last layer; of each neuron the offset comes first, then its weights.
     """
     network, planes = dynamics.network, dynamics.planes
-    weights, biases = [*network.weights], [*network.biases]
-    weights[0] = weights[0] / network.input_scaler.deviation
-    biases[0] = biases[0] - weights[0] @ network.input_scaler.mean
-    weights[-1] = weights[-1] * network.output_scaler.deviation[:, None]
-    biases[-1] = biases[-1] * network.output_scaler.deviation + network.output_scaler.mean
-    layers = zip(weights, biases, strict=True)
-    packed = np.concatenate([np.column_stack([bias, weight]).ravel() for weight, bias in layers])
+    packed = np.concatenate([np.column_stack([bias, weight]).ravel() for weight, bias in network.folded()])
     ends, kind = np.column_stack([dynamics.low, dynamics.high]).ravel(), _KINDS.index(network.activation)
     lengths = (planes, planes * planes, 3 * planes, max(network.sizes), planes * max(network.sizes))
     return (packed, np.array(network.sizes), ends, kind), tuple((0,) * length for length in lengths)

@@ -129,6 +129,15 @@ class Network:
         """Inputs, neurons of each hidden layer, outputs."""
         return (self.weights[0].shape[1], *(len(bias) for bias in self.biases))
 
+    def folded(self) -> list[tuple[Array, Array]]:
+        """Weights and biases of each layer, with scaling folded into the first and the last."""
+        weights, biases = [*self.weights], [*self.biases]
+        weights[0] = weights[0] / self.input_scaler.deviation
+        biases[0] = biases[0] - weights[0] @ self.input_scaler.mean
+        weights[-1] = weights[-1] * self.output_scaler.deviation[:, None]
+        biases[-1] = biases[-1] * self.output_scaler.deviation + self.output_scaler.mean
+        return list(zip(weights, biases, strict=True))
+
     def at(self, others: Mapping[str, float]) -> Network:
         """The network of the tip alone that this one is where its other inputs stay at these values (SI units).
 

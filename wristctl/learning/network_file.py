@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -23,6 +23,7 @@ NETWORK = "models/network.safetensors"
 ENTRY = "wristctl"
 
 Positive = Annotated[float, Field(gt=0)]
+H = TypeVar("H", bound=Section)
 
 
 TIP = ("x", "y", "z")
@@ -116,26 +117,24 @@ def save_network(network: Network, path: Path, training: dict[str, object]) -> N
         domain=_Region(theta=network.domain.theta, arc_length=network.domain.arc_length, reach=network.domain.reach),
         training=training,
     )
+    write_layers(path, network, header.model_dump_json(exclude={"domain": {"reach"}} if planes == 1 else None))
+
+
+def write_layers(path: Path, network: Network, header: str) -> None:
+    """Write a network's weights and biases, layer by layer, under this header."""
     tensors = {}
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         tensors[f"{layer}.weight"], tensors[f"{layer}.bias"] = np.ascontiguousarray(weight), bias
     with replacing(path) as temporary:
-        text = header.model_dump_json(exclude={"domain": {"reach"}} if planes == 1 else None)
-        temporary.write_bytes(save(tensors, {ENTRY: text}))
+        temporary.write_bytes(save(tensors, {ENTRY: header}))
 
 
 def load_network(path: Path) -> Network:
     """Read a network. Raises UserError for anything that `save_network` would not have written."""
-    header, tensors = _read(path)
-    weights, biases, entries = [], [], header.others
-    for layer, (inputs, neurons) in enumerate(
-        pairwise((header.planes + 1 + len(entries), *header.hidden, header.planes))
-    ):
-        weights.append(_tensor(path, tensors, f"{layer}.weight", (neurons, inputs)))
-        biases.append(_tensor(path, tensors, f"{layer}.bias", (neurons,)))
+    header, tensors = read_layers(path, _Header)
+    entries = header.others
     return Network(
-        tuple(weights),
-        tuple(biases),
+        *layers_of(path, tensors, (header.planes + 1 + len(entries), *header.hidden, header.planes)),
         header.activation,
         Scaler(
             np.array([*header.input.mean, *(entry.mean for entry in entries)]),
@@ -152,10 +151,11 @@ def load_network(path: Path) -> Network:
 
 def training_record(path: Path) -> dict[str, object]:
     """Record of the training that `save_network` wrote. Raises UserError like `load_network`."""
-    return _read(path)[0].training
+    return read_layers(path, _Header)[0].training
 
 
-def _read(path: Path) -> tuple[_Header, dict[str, Array]]:
+def read_layers(path: Path, kind: type[H]) -> tuple[H, dict[str, Array]]:
+    """A file's header, of this kind, and its arrays. Raises UserError for a file that has not both."""
     if not path.is_file():
         raise UserError("there is no such network file", str(path), ("train one with `", Call("train"), "`"))
     try:
@@ -168,11 +168,20 @@ def _read(path: Path) -> tuple[_Header, dict[str, Array]]:
     if text is None:
         raise _broken(path, "a safetensors file, but not one of wristctl's networks")
     try:
-        return _Header.model_validate_json(text), tensors
+        return kind.model_validate_json(text), tensors
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise _broken(path, f"the header's {where or 'text'} is wrong: {first['msg']}") from error
+
+
+def layers_of(
+    path: Path, tensors: dict[str, Array], sizes: tuple[int, ...]
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Weights and biases of a network with layers of these sizes. Raises UserError for arrays that are no such ones."""
+    shapes = list(enumerate(pairwise(sizes)))
+    weights = tuple(_tensor(path, tensors, f"{layer}.weight", (out, into)) for layer, (into, out) in shapes)
+    return weights, tuple(_tensor(path, tensors, f"{layer}.bias", (out,)) for layer, (_, out) in shapes)
 
 
 def _tensor(path: Path, tensors: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array:
@@ -191,4 +200,4 @@ def _columns(scaler: Scaler) -> dict[str, tuple[float, ...]]:
 
 
 def _broken(path: Path, problem: str) -> UserError:
-    return UserError(problem, where=str(path), fix="use a file from models/ of a sealed train run, or train again")
+    return UserError(problem, where=str(path), fix="use that of a sealed train run, or train again")

@@ -14,9 +14,8 @@ from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE, placed_values
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
-from wristctl.wrist.tendon_mechanics import shortening
+from wristctl.wrist.tendon_mechanics import ElasticTendons, shortening
 
 # Longest step of the integration [s], and segments of the simulated wrist.
 _STEP, _SEGMENTS = 0.25e-3, 4
@@ -39,7 +38,7 @@ def _follow(
     plant, count, m = parameters_of(model, rows_of(values), pulls), len(pulls), len(cut)
     row, result = rows_of(servos), rows_of(out)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), m, cut)
-    tendons = ElasticPlaces(part(rows_of(stiffness), 0, pulls), pulls)
+    tendons = ElasticTendons(part(rows_of(stiffness), 0, pulls), pulls)
     reeled, zero = lanes_like(tendons.stiffness), zero_like(q[0])
     for _ in range(steps):
         path = path_before(tendons, plant, q)

@@ -79,7 +79,6 @@ def wind(drive: Any, state: Any, sent: Any, t: int, target: Any, moving: Any, h:
     Returns the place where its host believes it to be in the middle of the period, or its mean over it, and the pull
     that is withheld.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(wind, SpoolDrive)
@@ -145,7 +144,6 @@ def actuate(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
     become the torque [N m] that the motors withhold, by this belief: what of the command their speed and acceleration
     keep from the wrist over this period.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(actuate, IdealDrive)
@@ -203,7 +201,6 @@ def deliver(drive: Any, told: Any, time: Any, motion: Any) -> None:
     `told` are the state of the motors, the winding (the scale of counts, then the offset of each place [m]), the host's
     counts (T rows), rows as long as those of bends, and the tick [s].
     """
-    raise NotImplementedError("compiled code only")
 
 
 @implements(deliver, IdealDrive)
@@ -247,7 +244,6 @@ def _followed(drive: Any, told: Any, time: Any, motion: Any) -> None:
 @by_type
 def frictionless_pulls(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> None:
     """Write the pulls [N] on a wrist bent like this [rad] of what the host counts, of tendons that slide freely."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(frictionless_pulls, IdealDrive, LaggedDrive)
@@ -267,7 +263,6 @@ def _stretched(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> No
 @by_type
 def held_stiffness(drive: Any, zero: Any) -> Any:
     """Stiffness [N/m] of one elastic tendon on a held spool; 0 without them."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(held_stiffness, IdealDrive, LaggedDrive)

@@ -43,7 +43,6 @@ from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons
 
@@ -286,16 +285,9 @@ def _tendons(of: _Worlds, coordinates: Array, paths: Sequence[Array], counts: Se
     )
     elastic, pulls = of.loop.actuator.winds, (0,) * len(of.alike)
 
-    def stiffness_of(index: int) -> Array:
-        alike = of.alike[:1] if of.layout is None else of.alike
-        stiffness: Array = alike * motor_of(of.actuators[index]).stiffness
-        return stiffness
-
-    stiffness = of.rows(stiffness_of)
+    stiffness = of.rows(lambda index: of.alike * motor_of(of.actuators[index]).stiffness)
     if all(map(is_ideal, nonideals)) and isinstance(inner, NoInnerFriction):
-        if not elastic:
-            return NoTendons()
-        return ElasticTendons(stiffness) if of.layout is None else ElasticPlaces(stiffness, pulls)
+        return ElasticTendons(stiffness, pulls) if elastic else NoTendons()
 
     def resting(index: int) -> Array:
         winding, path = of.offsets(index), paths[index]
@@ -303,12 +295,10 @@ def _tendons(of: _Worlds, coordinates: Array, paths: Sequence[Array], counts: Se
         return unmoved(reeled, path, np.maximum(reeled - path[: len(reeled)], 0.0), coordinates[index])
 
     nonideal, state = of.rows(lambda index: np.array(nonideals[index])), of.of_each(resting)
-    if of.layout is None:
-        return RealTendons(stiffness, nonideal, state, inner) if elastic else PulledTendons(nonideal, state, inner)
     faults = of.rows(lambda index: faults_of(of.actuators[index], facts[index], of.alike).ravel())
     if elastic:
-        return RealPlaces(stiffness, nonideal, faults, state, inner, pulls)
-    return PulledPlaces(nonideal, faults, state, inner, pulls)
+        return RealTendons(stiffness, nonideal, faults, state, inner, pulls, (0,) * len(paths[0]))
+    return PulledTendons(nonideal, faults, state, inner, pulls)
 
 
 def _beliefs_in_space(of: _Worlds) -> Places:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -113,12 +113,17 @@ class Measured:
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
         """Results of the `chosen` motions, of the cases of worlds with so many `motions` each."""
-        indices = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
-        metrics = {name: values[:, indices] for name, values in self.metrics.items()}
-        return Measured(
-            metrics, self.failed[:, indices], self.lasted[:, indices], self.rests[indices], self.tension_range,
-            self.places,
-        )  # fmt: skip
+        return self.part(slice(None), np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen)))
+
+    def part(self, rows: slice, columns: slice | NDArray[np.int64]) -> Measured:
+        """What was measured of some gains on some of the cases."""
+        return replace(
+            self,
+            metrics={name: values[rows, columns] for name, values in self.metrics.items()},
+            failed=self.failed[rows, columns],
+            lasted=self.lasted[rows, columns],
+            rests=self.rests[columns],
+        )
 
 
 def measure(

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,42 @@ class LoopCase(NamedTuple):
     high: float
 
 
+class Cycle:
+    """A whole cycle of a wrist: its works, and how all that it tells changes with the integration step."""
+
+    course: Spooled
+    angles: ClassVar[tuple[str, ...]]
+    """Names of the angles that it tells [rad]."""
+
+    @property
+    def friction_work(self) -> float:
+        """Energy that friction took [J]."""
+        return float(self.course.friction[-1] - self.course.friction[0])
+
+    @property
+    def raw_work(self) -> float:
+        """Energy that the spools gave: the area of the loop of their pulls over the tendons' path [J]."""
+        return float(self.course.raw[-1] - self.course.raw[0])
+
+    @property
+    def damped_work(self) -> float:
+        """Energy that the wrist's damping took [J]."""
+        return float(self.course.damped[-1] - self.course.damped[0])
+
+    def change(self, coarse: Self) -> float:
+        """Largest relative change of angles and works from a longer step to this one."""
+        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
+        floors = dict.fromkeys(self.angles, _LEAST_WIDTH)
+        floors |= dict.fromkeys(("friction_work", "raw_work", "damped_work"), least)
+        pairs = [(getattr(self, name), getattr(coarse, name), floor) for name, floor in floors.items()]
+        return largest_change([abs(fine - before) / max(abs(fine), floor) for fine, before, floor in pairs])
+
+
 @dataclass(frozen=True)
-class HysteresisLoop:
+class HysteresisLoop(Cycle):
     """The last of one and a half cycles, from the range's high end back to it; its last sample is the first again."""
 
+    angles = ("width",)
     case: LoopCase
     time: Array
     """(T,) [s]"""
@@ -80,34 +112,6 @@ class HysteresisLoop:
         """Bend on the way back less that on the way out, in the middle of the range [rad]."""
         quarter = (len(self.time) - 1) // 4
         return float(self.bend[quarter] - self.bend[3 * quarter])
-
-    @property
-    def friction_work(self) -> float:
-        """Energy that friction took [J]."""
-        return gained(self.course.friction)
-
-    @property
-    def raw_work(self) -> float:
-        """Area of the loop of pulls at the spools over the tendons' path [J]."""
-        return gained(self.course.raw)
-
-    @property
-    def damped_work(self) -> float:
-        """Energy that the wrist's damping took [J]."""
-        return gained(self.course.damped)
-
-    def change(self, coarse: HysteresisLoop) -> float:
-        """Largest relative change of width and works from a longer step to this one."""
-        of_width = abs(self.width - coarse.width) / max(abs(self.width), _LEAST_WIDTH)
-        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
-        names = "friction_work", "raw_work", "damped_work"
-        pairs = [(getattr(self, name), getattr(coarse, name)) for name in names]
-        return largest_change([of_width, *(abs(fine - before) / max(abs(fine), least) for fine, before in pairs)])
-
-
-def gained(work: Array) -> float:
-    """Work [J] of a course of what was done so far (T,)."""
-    return float(work[-1] - work[0])
 
 
 def largest_change(changes: Sequence[float]) -> float:

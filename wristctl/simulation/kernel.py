@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_at
 from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
@@ -133,10 +133,9 @@ class LoopState(NamedTuple):
     """State of the rollouts, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `memory` is the law's in each plane,
-    `coordinates` the plant's with their rates, `tendons` as they are with their state: Tendons of
-    `wristctl.wrist.tendon_mechanics` in one plane, Places of `wristctl.wrist.spatial.spooled_tendons` in two. `record`
-    [block, sample, column, lane] takes each sample's values, all or briefly, or has no samples. `watch` is the camera
-    with its observer, or NoCamera.
+    `coordinates` the plant's with their rates, `tendons` as they are with their state
+    (`wristctl.wrist.tendon_mechanics`). `record` [block, sample, column, lane] takes each sample's values, all or
+    briefly, or has no samples. `watch` is the camera with its observer, or NoCamera.
     """
 
     which: Any
@@ -259,12 +258,9 @@ def _onward(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: 
 
     `step` is the tick's time, by how much later the step begins, and how long it is [s].
     """
-    raise NotImplementedError("compiled code only")
 
 
-@implements(_onward, IdealDrive, LaggedDrive)
-def _stays(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
-    pass
+implements(_onward, IdealDrive, LaggedDrive)(nothing)
 
 
 @implements(_onward, SpoolDrive, ServoDrive)
@@ -306,7 +302,6 @@ def gather_lanes(tables: Any, which: Any, sample: int, out: Any) -> None:
 @by_type
 def _under(acting: Any, which: Any, sample: int, out: Any, rows: Any, plant: Any) -> Any:
     """The plant under one sample's disturbances, which are gathered into `out`, the memory of the rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_under, Undisturbed)

@@ -16,7 +16,7 @@ from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.simulation.arrival import missing
-from wristctl.simulation.motion import GOALS, Goals, goals_of_bends
+from wristctl.simulation.motion import GOALS, Goals
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.stick_slip import jump, plateau
 from wristctl.simulation.trajectory import PLANES, Trajectory, size_of
@@ -98,20 +98,6 @@ def of_trajectory(trajectory: Trajectory) -> dict[str, float]:
     """The metrics that come from a trajectory."""
     chosen = {name: metric.of_trajectory for name, metric in METRICS.items() if metric.of_trajectory is not None}
     return {name: float(value(trajectory)) for name, value in chosen.items()}
-
-
-def of_course(course: Trajectory) -> dict[str, float]:
-    """All metrics of a trajectory that was recorded sample by sample, from straight to where its reference ends."""
-    from wristctl.control.response import FULL  # compiled code, which the table does not need
-
-    step, planes = float(course.time[1] - course.time[0]), course.planes
-    acting = course.tension if course.acting is None else course.acting
-    saturated = np.zeros(len(course.time)) if course.share is None else (course.share < FULL).astype(float)
-    goals = goals_of_bends(course.bend_ref.T, course.time)
-    totals = totals_of_series(step, course.bend, course.bend_ref, acting, saturated, goals)
-    totals.sums["alive"][:] = float(not course.failed)
-    values = {name: float(value[0]) for name, value in summary(totals, metrics_in(planes)).items()}
-    return values | of_trajectory(course)
 
 
 def metrics_of(

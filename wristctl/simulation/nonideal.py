@@ -11,9 +11,8 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
-from wristctl.lanes.lane import where, zero_like
+from wristctl.lanes.lane import where
 from wristctl.wrist.dahl import Inner, InnerFriction, InnerFrictionInSpace, NoInnerFriction, inner_state
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_mechanics import (
     CREPT,
     LOST,
@@ -23,7 +22,6 @@ from wristctl.wrist.tendon_mechanics import (
     SLIPPED,
     WRAPPED,
     ElasticTendons,
-    Fault,
     Nonideal,
     NoTendons,
     PulledTendons,
@@ -97,6 +95,14 @@ def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array, section: str
     return faults
 
 
+def faults_of_sides(nonideal: Nonideal, tendons: int) -> Array:
+    """Rows of Fault of a plane's tendons (4, tendons), of either side in turn: the + side's slip, the first breaks."""
+    number = np.arange(tendons)
+    broken_at = np.where(number == 0, nonideal.broken_at, math.inf)
+    slips_at = np.where(number % 2 == 0, nonideal.slips_at, math.inf)
+    return np.array([broken_at, np.full(tendons, nonideal.left), slips_at, np.full(tendons, nonideal.torque)])
+
+
 def is_ideal(nonideal: Nonideal) -> bool:
     """Whether these values change nothing."""
     shares = nonideal.friction, nonideal.tendon_creep, nonideal.spring_creep, nonideal.backlash
@@ -161,30 +167,10 @@ def torque_share(speed: Any, corner_speed: Any, top_speed: Any) -> Any:
 
 
 @compiled
-def _break(tendons: Any, t: int, time: Any, fault: Any) -> None:
+def _break(tendons: Any, t: int, time: Any) -> None:
     """Leave a share of a place's tendons from the time on at which one of them breaks, for good."""
-    state, share = tendons.state, row_of(t, SHARE)
-    state[share] = minimum(state[share], where(time >= fault.broken_at, fault.left, 1.0))
-
-
-@by_type
-def fault_at(tendons: Any, t: int) -> Any:
-    """Fault of a place of tendons; of a plane's the + side's slip, and the first of them breaks."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(fault_at, PulledTendons, RealTendons)
-def _fault_of_sides(tendons: Any, t: int) -> Any:
-    nonideal = tendons.nonideal
-    never = zero_like(nonideal.slip) + math.inf
-    broken_at, slips_at = nonideal.broken_at if t == 0 else never, nonideal.slips_at if t % 2 == 0 else never
-    return Fault(broken_at, nonideal.left, slips_at, nonideal.torque)
-
-
-@implements(fault_at, PulledPlaces, RealPlaces)
-def _fault_of_places(tendons: Any, t: int) -> Any:
-    faults = tendons.faults
-    return Fault(faults.broken_at[t], faults.left[t], faults.slips_at[t], faults.holds[t])
+    state, share, faults = tendons.state, row_of(t, SHARE), tendons.faults
+    state[share] = minimum(state[share], where(time >= faults.broken_at[t], faults.left[t], 1.0))
 
 
 @compiled
@@ -194,11 +180,11 @@ def place_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any
     It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks; both of
     the last for good.
     """
-    nonideal, state, fault = tendons.nonideal, tendons.state, fault_at(tendons, t)
+    nonideal, state, faults = tendons.nonideal, tendons.state, tendons.faults
     play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
-    _break(tendons, t, time, fault)
-    state[slip] = maximum(state[slip], where(time >= fault.slips_at, nonideal.slip, 0.0))
-    holds = fault.holds * torque_share(speed, nonideal.corner_speed, nonideal.top_speed)
+    _break(tendons, t, time)
+    state[slip] = maximum(state[slip], where(time >= faults.slips_at[t], nonideal.slip, 0.0))
+    holds = faults.holds[t] * torque_share(speed, nonideal.corner_speed, nonideal.top_speed)
     state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
     on_spool = delivered - state[lost] - state[slip]
     state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)
@@ -211,23 +197,22 @@ def spools_after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path
 
     `speeds` are the spools' [m/s].
     """
-    raise NotImplementedError("compiled code only")
 
 
-@implements(spools_after_slip, NoTendons, ElasticTendons, ElasticPlaces)
+@implements(spools_after_slip, NoTendons, ElasticTendons)
 def _as_delivered(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
     for t in range(len(held)):
         held[t] = delivered[t]
 
 
-@implements(spools_after_slip, PulledTendons, PulledPlaces)
+@implements(spools_after_slip, PulledTendons)
 def _pulls_that_are_left(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
     for t in range(len(held)):
-        _break(tendons, t, time, fault_at(tendons, t))
+        _break(tendons, t, time)
         held[t] = tendons.state[row_of(t, SHARE)] * delivered[t]
 
 
-@implements(spools_after_slip, RealTendons, RealPlaces)
+@implements(spools_after_slip, RealTendons)
 def _after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
     for t in range(len(held)):
         held[t] = place_after_slip(tendons, t, delivered[t], speeds[t], time, shortening(path, t))

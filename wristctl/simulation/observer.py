@@ -16,7 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Sides, belief_in_lanes, coupling, moment_arms_at
 from wristctl.control.model import one_segment
 from wristctl.control.response import OF_A_PLANE
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, held_stiffness
@@ -82,7 +82,8 @@ class Watch(NamedTuple):
 
 
 class Knowing(NamedTuple):
-    """Belief of the controller's side and its drive, and rows as long as those of bends, pulls and moment arms."""
+    """Belief of the controller's side and its drive, and rows as long as those of bends, pulls and moment arms; of one
+    loop's arrays tuples with an entry for each plane, place and arm."""
 
     belief: Any
     drive: Any
@@ -91,20 +92,10 @@ class Knowing(NamedTuple):
     arms: Any
 
 
-class Known(NamedTuple):
-    """One loop's arrays behind Knowing: belief and drive, and tuples with an entry for each plane, place and arm."""
-
-    belief: Any
-    drive: Any
-    bend: Any
-    pulls: Any
-    arms: Any
-
-
-def known_of_sides(wrist: WristParameters, actuator: Actuator, alike: ArrayLike = SIDES) -> Known:
+def known_of_sides(wrist: WristParameters, actuator: Actuator, alike: ArrayLike = SIDES) -> Knowing:
     """Knowledge of a controller's side in one plane, with so many tendons alike on either side (2,)."""
     counts = np.array(alike, float)
-    return Known(Sides(segments(wrist, 1)[None], counts), drive_of(actuator, counts), (0,), (0, 0), (0, 0))
+    return Knowing(Sides(segments(wrist, 1)[None], counts), drive_of(actuator, counts), (0,), (0, 0), (0, 0))
 
 
 @spelled_out
@@ -186,7 +177,6 @@ def _sample(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, h: fl
 def sense(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, rate: Any, h: float, seen: Any) -> None:
     """Write what the law sees (3 P rows): bends and rates as they are, or, behind a camera, as the observer has them
     with the load."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(sense, NoCamera)
@@ -256,12 +246,9 @@ def predict(observer: Any, knowing: Any, tick: int, counts: Any, h: float) -> No
 @by_type
 def go_on(watch: Any, knowing: Any, tick: int, counts: Any, h: float) -> None:
     """`predict` behind a camera; nothing where there is none."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(go_on, NoCamera)
-def _nothing(watch: Any, knowing: Any, tick: int, counts: Any, h: float) -> None:
-    pass
+implements(go_on, NoCamera)(nothing)
 
 
 @implements(go_on, Watch)

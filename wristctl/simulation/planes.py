@@ -14,7 +14,7 @@ from wristctl.errors import UserError
 from wristctl.simulation.live_reference import followed_bends
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.recording import recorded_bends, recorded_tips
-from wristctl.simulation.reference import REFERENCES, by_angles, course_of, estimated, motion, toward
+from wristctl.simulation.reference import REFERENCES, by_angles, course_of, estimated, grid_of, motion, toward
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse, TipPath
@@ -103,7 +103,7 @@ def motion_in(
         directed = reference if direction is None else toward(reference, direction)
         return motion(directed, wrist, horizon, period, network, later)
     if reference.inverse == "network" and reference.kind == "recording":
-        tips = recorded_tips(reference, _grid(horizon, period))
+        tips = recorded_tips(reference, grid_of(horizon, period))
         if tips is not None:  # of a wrist that need be no arc
             rows, outside = _through(network, tips)
             through = Motion.of_bends(within(rows, wrist, "reference.file"), period, wrist.length)
@@ -125,11 +125,6 @@ def _through(network: Inverse | None, tips: TipPath) -> tuple[Array, float]:
     return np.ascontiguousarray(rows), float(np.mean(estimate.outside))
 
 
-def _grid(horizon: float, period: float) -> Array:
-    time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
-    return time
-
-
 def _direction(reference: Reference, direction: DirectionName | None) -> DirectionName:
     return direction or REFERENCES[reference.kind].plane or "ulnar"
 
@@ -144,7 +139,7 @@ def bends_of(
     """
     reference = by_angles(reference)
     kind = REFERENCES[reference.kind]
-    time = _grid(horizon, period)
+    time = grid_of(horizon, period)
     if kind.planes == 2:
         return within(course_of(reference, kind, time), wrist)
     if reference.kind == LIVE:

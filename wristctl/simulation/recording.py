@@ -137,11 +137,16 @@ def _course(reference: Reference, time: Array) -> Array:
 @lru_cache(maxsize=4)
 def _joined(recorded: Recording, noise_deg: float, times: bytes) -> Array:
     """The recording at those times, (2, 3, T) of tips, else (1, 3, T): a sweep of its scale splines it once."""
-    time, end = np.frombuffer(times), recorded.time[-1]
-    within = np.clip(time, 0.0, end)
-    arcs = zip(recorded.arc[: 1 + recorded.of_tips], (np.deg2rad(noise_deg), 0.0), strict=False)
-    course = np.stack([_splined(recorded.time, arc, noise, within) for arc, noise in arcs])
-    course[:, 1:, (time < 0.0) | (time > end + 1e-12)] = 0.0
+    noises = (np.deg2rad(noise_deg), 0.0)[: 1 + recorded.of_tips]
+    return _held(np.frombuffer(times), recorded.time, recorded.arc[: 1 + recorded.of_tips], noises)
+
+
+def _held(time: Array, recorded: Array, columns: Iterable[Array], noises: Iterable[float]) -> Array:
+    """Columns that were `recorded` at times from 0, splined at times (T,), (columns, 3, T); held after the last."""
+    within = np.clip(time, 0.0, recorded[-1])
+    pairs = zip(columns, noises, strict=True)
+    course = np.stack([_splined(recorded, column, noise, within) for column, noise in pairs])
+    course[:, 1:, (time < 0.0) | (time > recorded[-1] + 1e-12)] = 0.0
     return course
 
 
@@ -156,6 +161,16 @@ def _splined(time: Array, samples: Array, noise: float, times: Array) -> Array:
     return np.stack([smooth(times), smooth.derivative(1)(times), smooth.derivative(2)(times)])
 
 
+def _of_two_planes(reference: Reference) -> tuple[OpenLog, Array | None, bool]:
+    """A recording's log, the bends (T, 2) that it has, and whether its tips are followed, which then are all there."""
+    log = _looked_at(read_log(Path(reference.file or ""), reference.columns or "", "recording", others=True))
+    bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
+    of_tips = (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP)
+    if of_tips:
+        log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))
+    return log, bends, of_tips
+
+
 def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) -> Array:
     """Bends of a recording's two planes with two derivatives, (2, 3, T) [rad], at times (T,) [s].
 
@@ -163,25 +178,19 @@ def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) ->
     for the bend of the one arc that ends there. Raises UserError where it has one plane alone, and with the line for a
     tip where no arc of the wrist ends.
     """
-    file = Path(reference.file or "")
-    log = _looked_at(read_log(file, reference.columns or "", "recording", others=True))
-    bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
-    if (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP):
-        log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))
+    log, bends, of_tips = _of_two_planes(reference)
+    if of_tips:
         bends = _bends_of_tips(log, wrist)
     elif bends is None or reference.column == "tip":
         fix = "a header such as time [s],bend_y [deg],bend_z [deg] or time [s],x [mm],y [mm],z [mm], or loop.planes: 1"
-        raise UserError("no bends in two planes", str(file), fix)
+        raise UserError("no bends in two planes", str(Path(reference.file or "")), fix)
     whole = np.asarray(np.isfinite(bends).all(axis=1))
     log, bends = log.only(whole), bends[whole]
     recorded_time = log.columns["time"]
     for plane in bends.T:
         _check(log, recorded_time, plane)
-    since, noise = recorded_time - recorded_time[0], np.deg2rad(reference.value("noise_deg"))
-    within = np.clip(time, 0.0, since[-1])
-    course = np.stack([_splined(since, plane, noise, within) for plane in reference.value("scale") * bends.T])
-    course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
-    return course
+    noises = [np.deg2rad(reference.value("noise_deg"))] * 2
+    return _held(time, recorded_time - recorded_time[0], reference.value("scale") * bends.T, noises)
 
 
 def recorded_tips(reference: Reference, time: Array) -> TipPath | None:
@@ -189,22 +198,16 @@ def recorded_tips(reference: Reference, time: Array) -> TipPath | None:
 
     Raises UserError as `read_recording`, and for what is of bends alone: a scale, and noise that is smoothed.
     """
-    log = _looked_at(read_log(Path(reference.file or ""), reference.columns or "", "recording", others=True))
-    bends = {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns
-    if (bends and reference.column != "tip") or not all(name in log.columns for name in SPATIAL_TIP):
+    log, _, of_tips = _of_two_planes(reference)
+    if not of_tips:
         return None
     if reference.value("scale") != 1.0 or reference.value("noise_deg") != 0.0:
         fix = "leave scale and noise_deg out, or write the tips that are wanted"
         raise UserError("recorded tips behind a network are followed as they are", "reference.scale", fix)
-    log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))
     tips, since = np.stack([log.columns[name] for name in SPATIAL_TIP]), log.columns["time"]
     for plane in exact_bend(tips.T)[0].T:
         _check(log, since, plane)
-    since = since - since[0]
-    within = np.clip(time, 0.0, since[-1])
-    course = np.stack([_splined(since, axis, 0.0, within) for axis in tips])
-    course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
-    return TipPath(*course.transpose(1, 2, 0))
+    return TipPath(*_held(time, since - since[0], tips, [0.0] * 3).transpose(1, 2, 0))
 
 
 def _bends_of_tips(log: OpenLog, wrist: WristParameters) -> Array:

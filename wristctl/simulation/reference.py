@@ -207,7 +207,7 @@ def _evaluated(
     reference: Reference, wrist: WristParameters, horizon: float, period: float, network: Inverse | None
 ) -> Motion:
     kind = REFERENCES[reference.kind]
-    time = _grid(horizon, period)
+    time = grid_of(horizon, period)
     angles, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
     rest_time, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
     if reference.inverse != "network":
@@ -231,7 +231,8 @@ def by_angles(reference: Reference) -> Reference:
 
 
 @lru_cache(maxsize=64)
-def _grid(horizon: float, period: float) -> Array:
+def grid_of(horizon: float, period: float) -> Array:
+    """Times [s] of the samples of a motion, read-only."""
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
     time.setflags(write=False)
     return time

@@ -10,7 +10,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
-from wristctl.lanes.compiled import by_type, implements
+from wristctl.lanes.compiled import by_type, implements, itself
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.spool_timing import Timing, remembered_commands, timing_of
@@ -151,12 +151,9 @@ def drive_of(
 @by_type
 def drive_in_lanes(drive: Any) -> Any:
     """A drive of lanes from a drive whose motor is one block's array."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(drive_in_lanes, IdealDrive)
-def _ideal_in_lanes(drive: Any) -> Any:
-    return drive
+implements(drive_in_lanes, IdealDrive)(itself)
 
 
 @implements(drive_in_lanes, LaggedDrive)

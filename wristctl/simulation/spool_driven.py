@@ -26,7 +26,6 @@ from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters
 from wristctl.wrist.segments import Segments
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import SpatialWrist
-from wristctl.wrist.spatial.spooled_tendons import RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import (
     RealTendons,
@@ -35,7 +34,6 @@ from wristctl.wrist.tendon_mechanics import (
     row_of,
     shortening,
     spool_pull,
-    stiffness_at,
     tendons_in_lanes,
 )
 
@@ -111,7 +109,6 @@ class _Timing(NamedTuple):
 class _Lanes(NamedTuple):
     wrist: Any
     tendons: Any
-    """RealTendons, or RealPlaces in two planes."""
     winch: Any
     """1 for a winch."""
     state: Any
@@ -125,7 +122,6 @@ _WORKS = 3
 @by_type
 def _squares(plant: Any, rate: Any, sums: Any) -> None:
     """Add the products of rates that damping goes by, summed over the segments, to three rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_squares, Segments)
@@ -144,7 +140,6 @@ def _squares_in_space(plant: Any, rate: Any, sums: Any) -> None:
 @by_type
 def _damped(plant: Any, h: float, sums: Any) -> Any:
     """Work [J] that damping takes in a step of h [s] with these sums at its begin and its end together."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(_damped, Segments)
@@ -172,7 +167,7 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any, 
         tick, now = timing.first + k, rows_of(driven[k])
         path = path_before(tendons, segment, q)
         for t in range(count):
-            held = now[t] / stiffness_at(tendons, t) + shortening(path, t)
+            held = now[t] / tendons.stiffness[t] + shortening(path, t)
             reeled[t] = where(winch > 0.0, held, now[t])
             spool[t] = spool_pull(tendons, reeled[t], t, shortening(path, t))
         acting_pulls(tendons, reeled, path, wrist)
@@ -274,13 +269,11 @@ def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
             faults_of(driven.actuator, TendonFacts(), alike),
         )
         ends = np.zeros(_WORKS + 3 * places)
-        own = stiffness[:1] if layout is None else stiffness
-        rows.append((values, own, np.array(nonideal, float), faults.ravel(), memory, [driven.winch], begin, ends))
+        rows.append((values, stiffness, np.array(nonideal, float), faults.ravel(), memory, [driven.winch], begin, ends))
     begin, bent = np.array([driven.begin for driven in wrists]), np.array([driven.inner_z for driven in wrists])
     inner = inner_of([driven.plant for driven in wrists], begin, bent, to_blocks, planes)
     columns = (to_blocks(np.array(column, float)) for column in zip(*rows, strict=True))
     values, stiffness, nonideals, of_faults, memories, winch, state, ends = columns
-    if planes == 1:
-        return _Lanes(values, RealTendons(stiffness, nonideals, memories, inner), winch, state, ends)
-    tendons = RealPlaces(stiffness, nonideals, of_faults, memories, inner, (0,) * places)
+    shape = (0,) * places, (0,) * len(path)
+    tendons = RealTendons(stiffness, nonideals, of_faults, memories, inner, *shape)
     return _Lanes(values, tendons, winch, state, ends)

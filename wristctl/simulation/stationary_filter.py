@@ -11,7 +11,7 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.observer import Observer, knowing_in_lanes, known_of_sides, propagate
+from wristctl.simulation.observer import knowing_in_lanes, known_of_sides, propagate
 from wristctl.simulation.simulated_drives import SIDES, at_rest
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
@@ -172,10 +172,3 @@ def expected_error(belief: Belief) -> float:
             variances.append(covariance[0, 0])
         covariance = tick @ covariance @ tick.T + noise
     return float(np.sqrt(np.mean(variances)))
-
-
-def observer_of(belief: Belief, ticks: int, theta: float) -> Observer:
-    """One loop's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
-    start = np.array([theta, 0.0, 0.0])
-    (gain,) = stationary_gains([belief])
-    return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1))

@@ -23,7 +23,7 @@ from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import own_values
-from wristctl.wrist.spatial.spatial_statics import FrictionOnHeld, at_rest_along, spatial_equilibria_at
+from wristctl.wrist.spatial.spatial_statics import at_rest_along, spatial_equilibria_at
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -113,12 +113,12 @@ class Strokes:
         stiffness = 0.0 if self.winch else self.settings.tendon_stiffness
         if self.planes == 1:
             values = np.tile(segments(self.wrist, n), (len(angle), 1))
-            held = HeldTendons(given, np.full(len(angle), TENDONS_PER_SIDE * stiffness), friction, sheath)
+            held = HeldTendons(given, np.array([TENDONS_PER_SIDE * stiffness]), friction, sheath)
             ends = [at_rest_with(values, held, z, guess).sum(axis=1) for z in (FROM_BELOW, FROM_ABOVE)]
         else:
-            alike = None if self.winch else stiffness * self.layout.multiplicity.astype(float)
-            on_held, way = FrictionOnHeld(given, alike, friction, sheath), np.tile(self.toward, n) * np.ones_like(guess)
-            rests = [at_rest_along(self.wrist, n, on_held, side * way, guess) for side in (1.0, -1.0)]
+            held = HeldTendons(given, stiffness * self.layout.multiplicity.astype(float), friction, sheath)
+            way = np.tile(self.toward, n) * np.ones_like(guess)
+            rests = [at_rest_along(self.wrist, n, held, side * way, guess) for side in (1.0, -1.0)]
             ends = [self.along(tip_bends(rest)) for rest in rests]
         return np.stack(ends, axis=1)
 

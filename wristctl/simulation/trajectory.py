@@ -165,53 +165,32 @@ class Trajectory:
 
     def columns(self) -> dict[str, Array]:
         """Everything under the names of `meanings`, (T,) each; spools where there are any."""
-        return self._in_one_plane() if self.planes == 1 else self._in_two_planes()
-
-    def _in_two_planes(self) -> dict[str, Array]:
-        seen, load = self.theta if self.seen is None else self.seen, self.load
+        flat, count = self.planes == 1, len(self.time)
+        bend, ends = ("theta", [""]) if flat else ("bend", [f"_{plane}" for plane in PLANES])
         of_a_plane = {
-            "bend": self.theta, "rate": self.rate, "bend_seen": seen,
-            "load_seen": np.zeros_like(self.theta) if load is None else load, "bend_ref": self.theta_ref,
+            bend: self.theta, "rate": self.rate, f"{bend}_seen": self.theta if self.seen is None else self.seen,
+            "load_seen": np.zeros_like(self.theta) if self.load is None else self.load, f"{bend}_ref": self.theta_ref,
             "error": self.error, "torque_wanted": self.torque_wanted, "torque": self.torque,
         }  # fmt: skip
-        columns = {"time": self.time}
+        columns = {"time": self.time} | ({"theta_desired": self.theta_desired} if flat else {})
         for name, values in of_a_plane.items():
-            columns |= {f"{name}_{plane}": column for plane, column in zip(PLANES, values.T, strict=True)}
+            columns |= {f"{name}{end}": column for end, column in zip(ends, values.reshape(count, -1).T, strict=True)}
         for name, path in (("tip", self.tip), ("tip_desired", self.tip_desired)):
-            columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, path.T, strict=True)}
+            columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, path.T, strict=False)}
         acting = self.tension if self.acting is None else self.acting
-        for name, tendons in (("pull", self.tension), ("acting", acting), ("spool", self.spools)):
+        places = ("plus", "minus") if flat else range(1, self.tension.shape[1] + 1)
+        for name, tendons in (
+            ("tension" if flat else "pull", self.tension),
+            ("acting", acting),
+            ("spool", self.spools),
+        ):
             if tendons is not None:
-                columns |= {f"{name}_{t}": column for t, column in enumerate(tendons.T, 1)}
-        for k, bends in enumerate(self.segment_theta.reshape(len(self.time), -1, 2).transpose(1, 2, 0), 1):
-            columns |= {f"bend_{k}_{plane}": column for plane, column in zip(PLANES, bends, strict=True)}
+                columns |= {f"{name}_{place}": column for place, column in zip(places, tendons.T, strict=True)}
+        for k, bends in enumerate(self.segment_theta.reshape(count, -1, self.planes).transpose(1, 2, 0), 1):
+            columns |= {f"{bend}_{k}{end}": column for end, column in zip(ends, bends, strict=True)}
+        if flat:
+            return {name: columns[name] for name in dict.fromkeys((*COLUMNS, *columns)) if name in columns}
         return columns if self.share is None else columns | {"share": self.share}
-
-    def _in_one_plane(self) -> dict[str, Array]:
-        acting = self.tension if self.acting is None else self.acting
-        columns = {
-            "time": self.time,
-            "theta": self.theta,
-            "rate": self.rate,
-            "theta_seen": self.theta if self.seen is None else self.seen,
-            "load_seen": np.zeros_like(self.theta) if self.load is None else self.load,
-            "theta_ref": self.theta_ref,
-            "theta_desired": self.theta_desired,
-            "error": self.error,
-            "tip_x": self.tip[:, 0],
-            "tip_y": self.tip[:, 1],
-            "tip_desired_x": self.tip_desired[:, 0],
-            "tip_desired_y": self.tip_desired[:, 1],
-            "torque_wanted": self.torque_wanted,
-            "torque": self.torque,
-            "tension_plus": self.tension[:, 0],
-            "tension_minus": self.tension[:, 1],
-            "acting_plus": acting[:, 0],
-            "acting_minus": acting[:, 1],
-        }
-        if self.spools is not None:
-            columns |= {"spool_plus": self.spools[:, 0], "spool_minus": self.spools[:, 1]}
-        return columns | {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
 
     def frame(self) -> pd.DataFrame:
         """The columns as a table."""

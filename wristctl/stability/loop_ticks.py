@@ -24,7 +24,6 @@ from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
 from wristctl.wrist.dahl import InnerFriction, InnerFrictionInSpace
 from wristctl.wrist.plant import kernel_of, plant_in
-from wristctl.wrist.spatial.spooled_tendons import PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import CREPT, OF_A_TENDON, WRAPPED, PulledTendons, RealTendons, X, Z
 
@@ -69,15 +68,15 @@ def state_parts(batch: Batch, law: Controller, tick: int, back: Remembered) -> I
         further = np.concatenate([np.arange(1, 2 * places, 2), sent])
         name, unit = ("motor rate", _SPEED) if isinstance(drive, SpoolDrive) else ("motor target", _LENGTH)
         yield StatePart(name, state.motors, further, np.full(len(further), unit))
-    if isinstance(state.tendons, (RealTendons, RealPlaces)):
+    if isinstance(state.tendons, RealTendons):
         rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
         first = per_tendon * np.arange(places)
-        wrapped = first[:1] if isinstance(state.tendons, RealTendons) else first
+        wrapped = first[: len(state.tendons.path) - places]
         path = np.concatenate([first + X, wrapped + WRAPPED])
         yield StatePart("path", rows, path, np.array([_LENGTH] * places + [_ANGLE] * len(wrapped)))
         yield StatePart("bristle", rows, first + Z, np.ones(places))
         yield StatePart("tendon creep", rows, first + CREPT, np.full(places, _LENGTH))
-    if isinstance(state.tendons, (PulledTendons, RealTendons, PulledPlaces, RealPlaces)):
+    if isinstance(state.tendons, PulledTendons | RealTendons):
         rows = state.tendons.state
         yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))
         if isinstance(state.tendons.inner, (InnerFriction, InnerFrictionInSpace)):

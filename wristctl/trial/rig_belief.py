@@ -16,7 +16,7 @@ from wristctl.control.belief import Compensated, Places, belief_in_lanes, length
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.observer import Known, known_of_sides
+from wristctl.simulation.observer import Knowing, known_of_sides
 from wristctl.simulation.simulated_drives import drive_of
 from wristctl.simulation.stationary_filter import Belief, as_pairs, stationary_gains
 from wristctl.trial.spools import on_plus_side
@@ -105,13 +105,13 @@ def names_of_planes(planes: int, plane: str) -> tuple[str, ...]:
 
 def _known_of_places(
     wrist: WristParameters, turned: Sequence[WristParameters], layout: TendonLayout, actuator: Actuator
-) -> Known:
+) -> Knowing:
     count = len(layout.places)
     values, alike = placed_values(wrist, layout, 1), np.ones(count)
     models = np.array([segments(facing, 1) for facing in turned])
     pulls = (0,) * count
     belief = Places(models, alike, values, (0,) * (OF_A_TENDON * count), pulls, Compensated())
-    return Known(belief, drive_of(actuator, alike), (0,) * len(turned), pulls, (0,) * (len(turned) * count))
+    return Knowing(belief, drive_of(actuator, alike), (0,) * len(turned), pulls, (0,) * (len(turned) * count))
 
 
 def layout_of_axes(wrist: WristParameters) -> TendonLayout:

@@ -123,13 +123,13 @@ class OwnLoop:
             cases = [case for change in of_world for case in self._cases_under(change)]
             whole = measure(law, gains, cases, self._wrist, _SWINGS, converge=False)
             for number, change in enumerate(of_world):
-                found[change] = _part(whole, slice(None), slice(number * columns, (number + 1) * columns))
+                found[change] = whole.part(slice(None), slice(number * columns, (number + 1) * columns))
         if of_law:
             added = np.array([(change.size, 0.0) if change.of == "torque" else (1.0, change.size) for change in of_law])
             values = np.column_stack([np.tile(gains, (len(of_law), 1)), np.repeat(added, rows, axis=0)])
             whole = measure(changed_law(law), values, self._cases, self._wrist, _SWINGS, converge=False)
             for number, change in enumerate(of_law):
-                found[change] = _part(whole, slice(number * rows, (number + 1) * rows), slice(None))
+                found[change] = whole.part(slice(number * rows, (number + 1) * rows), slice(None))
         return found
 
     def _is_of_law(self, change: Change) -> bool:
@@ -143,17 +143,6 @@ class OwnLoop:
             loops = {id(case.loop): _changed(case.loop, change) for case in self._cases}
             self._changed[change] = [case._replace(loop=loops[id(case.loop)]) for case in self._cases]
         return self._changed[change]
-
-
-def _part(measured: Measured, rows: slice, columns: slice) -> Measured:
-    """What was measured of some gains on some of the cases."""
-    return replace(
-        measured,
-        metrics={name: values[rows, columns] for name, values in measured.metrics.items()},
-        failed=measured.failed[rows, columns],
-        lasted=measured.lasted[rows, columns],
-        rests=measured.rests[columns],
-    )
 
 
 def _changed(loop: Loop, change: Change) -> Loop:

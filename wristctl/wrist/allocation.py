@@ -211,39 +211,3 @@ def _limits(least: ArrayLike, greatest: ArrayLike, tendons: int) -> tuple[Array,
             what = f"pull {number} cannot be between {smallest:g} and {largest:g} N"
             raise UserError(what, f"pull {number}", "0 <= least <= greatest")
     return low, high
-
-
-def reachable_torques(arms: ArrayLike, least: ArrayLike, greatest: ArrayLike) -> Array:
-    """Corners (2 T, 2) [N m] of the torques that pulls within limits give at one pose, counterclockwise.
-
-    Of arms (T, 2) [m] and limits [N], as `allocated`; without those that bend nothing. The polygon is a zonotope: its
-    edges are the arms times the room between their limits, sorted by direction.
-    """
-    levers = np.asarray(arms, float)
-    low, high = _limits(least, greatest, len(levers))
-    edges = (high - low)[:, None] * levers
-    edges = edges[np.hypot(*edges.T) > 0.0]
-    upward = np.where((edges[:, 1] > 0.0) | ((edges[:, 1] == 0.0) & (edges[:, 0] > 0.0)), 1.0, -1.0)
-    sides = upward[:, None] * edges
-    sides = sides[np.argsort(np.arctan2(sides[:, 1], sides[:, 0]), kind="stable")]
-    lowest = low @ levers + edges[upward < 0.0].sum(axis=0)
-    steps = np.concatenate([np.zeros((1, 2)), sides, -sides[:-1]])
-    corners: Array = lowest + np.cumsum(steps, axis=0)
-    return corners
-
-
-def null_space(arms: ArrayLike) -> Array:
-    """Changes of pulls that change no torque (T - 2, T): orthonormal, the first as close to all alike as there is.
-
-    Of arms (T, 2) [m] at one pose. The first one is co-contraction: it stiffens what pulls at the wrist.
-    """
-    levers = np.asarray(arms, float)
-    _, sizes, rows = np.linalg.svd(levers.T)
-    free = rows[int((sizes > _ROUNDING * sizes[0]).sum()) :]
-    alike = free.T @ (free @ np.ones(len(levers)))
-    if not np.hypot.reduce(alike) > _ROUNDING:
-        return free
-    _, _, turned = np.linalg.svd((free @ alike)[None, :])
-    basis: Array = turned @ free
-    basis[0] *= np.sign(basis[0].sum())
-    return basis

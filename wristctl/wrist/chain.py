@@ -7,8 +7,8 @@ the tangent before it, as an arc's and as two links' with a hinge between them. 
 from typing import Any
 
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.lane import turn, zero_like
-from wristctl.lanes.rows import planes_like
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist import arcs, tendons
 from wristctl.wrist.segments import Segments
 
@@ -17,31 +17,26 @@ from wristctl.wrist.segments import Segments
 def chords(segment: Any, theta: Any, arc: Any) -> Any:
     """Chord of each part in base axes and its first three derivatives by its own coordinate, into Chords; the last
     tangent."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def lengths(segment: Any, theta: Any) -> Any:
     """Lengths of the + and the - side's tendons along one part [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def moment_arms(segment: Any, theta: Any) -> Any:
     """Moment arms of the + and the - side along one part: minus the lengths' derivatives by its coordinate [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
     """Torque of both sides' pulls [N] on each part and its derivative by that part's coordinate, into two rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def spring(segment: Any, k: int) -> Any:
     """Stiffness of the part k from the base [N m/rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(chords, Segments)
@@ -49,19 +44,13 @@ def _chords(segment: Any, theta: Any, arc: Any) -> Any:
     return arcs.chords(theta, segment.length, arc)
 
 
-@implements(lengths, Segments)
-def _lengths(segment: Any, theta: Any) -> Any:
-    return tendons.lengths(theta, segment)
+implements(lengths, Segments)(tendons.lengths)
 
 
-@implements(moment_arms, Segments)
-def _moment_arms(segment: Any, theta: Any) -> Any:
-    return tendons.moment_arms(theta, segment)
+implements(moment_arms, Segments)(tendons.moment_arms)
 
 
-@implements(tendon_torques, Segments)
-def _tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
-    tendons.tendon_torques(theta, segment, plus, minus, torque, slope)
+implements(tendon_torques, Segments)(tendons.tendon_torques)
 
 
 @implements(spring, Segments)
@@ -80,13 +69,10 @@ def bend_along(segment: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
     bend[0], speed[0] = angle, turning
 
 
+_load = replacing("stiffness", "force_y")
+
+
 @compiled
-def tip_derivatives(segment: Any, q: Any, place: Any, angle: Any) -> None:
-    """Part k turns all that lies beyond it: d(tip)/d(theta_k) = dz_k + i (tip - end of part k)."""
-    arc = arcs.Chords(planes_like(q), planes_like(q), planes_like(q), planes_like(q))
-    chords(segment, q, arc)
-    beyond = zero_like(segment.length) * arc.z[0]
-    for k in range(len(q) - 1, -1, -1):
-        place[k] = arc.dz[k] + turn(beyond)
-        angle[k] = 1.0 + zero_like(segment.length)
-        beyond = beyond + arc.z[k]
+def disturbed_chain(segment: Any, force: Any, scale: Any) -> Any:
+    """The wrist with a force (3) more on the last disc [N], which it feels across alone, and stiffness scaled."""
+    return _load(segment, (scale * segment.stiffness, force[1] + segment.force_y))

@@ -16,10 +16,8 @@ from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, 
 from wristctl.wrist import tendons
 from wristctl.wrist.arcs import Chords, chords, tip
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import Segments, load_segments
-from wristctl.wrist.tendon_mechanics import NoTendons
 
 
 class Terms(NamedTuple):
@@ -54,8 +52,8 @@ def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         for i in range(n):
             angle = angle + theta[i]
             result[3 + i] = r[i] - segment.stiffness * theta[i] - segment.damping * omega[i]
-            length_plus, length_minus = tendons.lengths(theta[i], segment)
-            arm_plus, arm_minus = tendons.moment_arms(theta[i], segment)
+            length_plus, length_minus = tendons.lengths(segment, theta[i])
+            arm_plus, arm_minus = tendons.moment_arms(segment, theta[i])
             result[3 + n + 4 * i] = length_plus
             result[4 + n + 4 * i] = length_minus
             result[5 + n + 4 * i] = arm_plus
@@ -91,7 +89,7 @@ def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         mass, by_theta, by_rate = square_like(theta), square_like(theta), square_like(theta)
         r, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta)
         tangent = chords(theta, segment.length, arc)
-        tendons.tendon_torques(theta, segment, pulls[0], pulls[1], pull, slope)
+        tendons.tendon_torques(segment, theta, pulls[0], pulls[1], pull, slope)
         mass_matrix(segment, arc, tangent, mass)
         bias(segment, theta, omega, arc, tangent, pull, r)
         residual_jacobians(segment, omega, acceleration, arc, tangent, slope, by_theta, by_rate)
@@ -110,45 +108,21 @@ def linearised(
 
     `pulls` are the two sides' total tensions [N], shape (..., 2).
     """
-    theta, omega, acceleration = np.broadcast_arrays(theta, omega, acceleration)
-    *batch, n = theta.shape
-    pulls = np.broadcast_to(pulls, (*batch, 2))
-    states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
-    blocks, values = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
-    out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
-    _linearised(values, blocks, out, (0,) * n)
-    rows = to_rows(out, len(states)).reshape(*batch, -1)
-    r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
-    return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
+    values = np.reshape(parameters, (-1, len(Segments._fields)))
+    return linearised_by(_linearised, values, (theta, omega, acceleration), pulls, 2)
 
 
-@kernel
-def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segments: Any) -> None:
-    segment, pull = load_segments(rows_of(parameters)), rows_of(pulls)
-    n = len(segments)
-    for sample in range(steps.shape[0]):
-        state = rows_of(out[sample + 1])
-        before = rows_of(out[sample])
-        for i in range(2 * n):
-            state[i] = before[i]
-        theta, omega = part(state, 0, segments), part(state, n, segments)
-        for _ in range(steps[sample]):
-            step(segment, theta, omega, (pull[0], pull[1]), NoTendons(), h + zero_like(pull[0]))
-
-
-def integrate(
-    parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
-) -> tuple[Array, Array]:
-    """Motion from one state under held pulls [N] of the two sides: angles and rates (T, n) at the given times [s].
-
-    Steps of h; every time must be a whole number of steps.
-    """
-    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
-    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
-        raise ValueError(f"times must be whole numbers of steps of {h} s")
-    n = len(np.atleast_1d(theta))
-    out = np.empty((len(counts) + 1, 2 * n))
-    out[0] = np.concatenate([np.atleast_1d(theta), np.atleast_1d(omega)])
-    held = np.ascontiguousarray(pulls, float)
-    _integrate(np.ascontiguousarray(parameters, float), held, h, np.diff(counts, prepend=0), out, (0,) * n)
-    return out[1:, :n], out[1:, n:]
+def linearised_by(
+    function: Any, values: Array, motion: tuple[ArrayLike, ...], pulls: ArrayLike, places: int, *shapes: tuple[int, ...]
+) -> tuple[Array, Array, Array]:
+    """Residual (..., m) and its derivatives (..., m, m) by a kernel of rows of values, at coordinates, rates and
+    accelerations (..., m) under pulls (..., places) [N]; `shapes` are the kernel's further arguments."""
+    states_of = np.broadcast_arrays(*motion)
+    *batch, m = states_of[0].shape
+    states = np.concatenate([*states_of, np.broadcast_to(np.asarray(pulls, float), (*batch, places))], axis=-1)
+    states = states.astype(float).reshape(-1, 3 * m + places)
+    blocks = to_blocks(states)
+    out = np.empty((len(blocks), m + 2 * m * m, *blocks.shape[2:]))
+    function(spread(values, len(states)), blocks, out, (0,) * m, *shapes)
+    r, by_q, by_rate = np.split(to_rows(out, len(states)).reshape(*batch, -1), [m, m + m * m], axis=-1)
+    return r, by_q.reshape(*batch, m, m), by_rate.reshape(*batch, m, m)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, itself, nothing
 from wristctl.lanes.functions import expm1_of_negative
 from wristctl.lanes.lane import sqrt, where
 from wristctl.lanes.rows import rows_of
@@ -81,12 +81,9 @@ def inner_state(q: Array, z: float = 0.0) -> Array:
 @by_type
 def inner_in_lanes(inner: Any) -> Any:
     """Inner friction of lanes from that of one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(inner_in_lanes, NoInnerFriction)
-def _none_in_lanes(inner: Any) -> Any:
-    return inner
+implements(inner_in_lanes, NoInnerFriction)(itself)
 
 
 @implements(inner_in_lanes, InnerFriction)
@@ -115,12 +112,9 @@ def _turned_in_space(inner: Any, q: Any, k: int) -> Any:
 @by_type
 def resist(inner: Any, theta: Any, r: Any) -> None:
     """Add to the residual r (n,) the torque with which the wrist resists being at theta (n,)."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(resist, NoInnerFriction)
-def _resist_nothing(inner: Any, theta: Any, r: Any) -> None:
-    pass
+implements(resist, NoInnerFriction)(nothing)
 
 
 @implements(resist, InnerFriction)
@@ -141,12 +135,9 @@ def _resist_in_space(inner: Any, q: Any, r: Any) -> None:
 @by_type
 def resist_slope(inner: Any, theta: Any, omega: Any, by_theta: Any) -> None:
     """Add to dr/d(theta), (n, n), what inner friction adds at the start of a step."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(resist_slope, NoInnerFriction)
-def _no_slope(inner: Any, theta: Any, omega: Any, by_theta: Any) -> None:
-    pass
+implements(resist_slope, NoInnerFriction)(nothing)
 
 
 @implements(resist_slope, InnerFriction)
@@ -172,12 +163,9 @@ def _resist_slope_in_space(inner: Any, q: Any, rate: Any, by_q: Any) -> None:
 @by_type
 def remember_bend(inner: Any, theta: Any) -> None:
     """Take the bristles over to the end of a step, at coordinates theta."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(remember_bend, NoInnerFriction)
-def _remember_nothing(inner: Any, theta: Any) -> None:
-    pass
+implements(remember_bend, NoInnerFriction)(nothing)
 
 
 @implements(remember_bend, InnerFriction)

@@ -17,17 +17,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled, implements, kernel
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, turn, zero_like
-from wristctl.lanes.named_tuples import replacing, tuple_of
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import (
     bend_along,
     chords,
+    disturbed_chain,
     lengths,
     moment_arms,
     spring,
     tendon_torques,
-    tip_derivatives,
 )
 from wristctl.wrist.dynamics import bias
 from wristctl.wrist.integrator import step
@@ -62,7 +62,7 @@ class Hinges(NamedTuple):
     """Stiffness of each hinge over that of the one before it."""
 
 
-_load, _read = replacing("stiffness", "force_y"), tuple_of(Hinges)
+_read = tuple_of(Hinges)
 
 
 @compiled
@@ -84,17 +84,6 @@ def _chords(segment: Any, theta: Any, arc: Any) -> Any:
         arc.d3z[k] = -1.0 * turn(link)
         tangent = after
     return tangent
-
-
-@compiled
-def _tip(segment: Any, theta: Any) -> Any:
-    tangent, half = planar(1.0 + zero_like(segment.length), 0.0), 0.5 * segment.length
-    position = zero_like(half) * tangent
-    for k in range(len(theta)):
-        after = tangent * _turned(theta[k])
-        position = position + half * (tangent + after)
-        tangent = after
-    return position, tangent
 
 
 @compiled
@@ -145,11 +134,6 @@ def _within(plant: Any, q: Any) -> Any:
     for k in range(1, len(q)):
         inside = inside & (abs(q[k]) < FOLDED)
     return inside
-
-
-@compiled
-def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
-    return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
 
 
 def tapered(wrist: WristParameters, n: int) -> tuple[float, float]:
@@ -235,9 +219,7 @@ HINGES = PlantModel(
     bend_of=bend_along,
     travel=travel,
     within=_within,
-    disturbed=_disturbed,
-    tip_pose=_tip,
-    tip_jacobian=tip_derivatives,
+    disturbed=disturbed_chain,
     angle=lambda q: q.sum(axis=-1),
     tips=_tips,
     taut=_taut,

@@ -10,7 +10,7 @@ order system the 2n equations of each stage reduce to n:
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing, spelled_out
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
@@ -81,23 +81,17 @@ def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
 @by_type
 def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
     """Add to the residual r (n,) what end stops and inner friction take and what creeping springs give."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
     """Add what end stops and inner friction add to dr/d(theta) and dr/d(rate), (n, n)."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(yield_, NoTendons, ElasticTendons)
-def stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
-    """There is none of it."""
+implements(yield_, NoTendons, ElasticTendons)(nothing)
 
 
-@implements(yield_jacobians, NoTendons, ElasticTendons)
-def stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    """There is none of it."""
+implements(yield_jacobians, NoTendons, ElasticTendons)(nothing)
 
 
 @implements(yield_, PulledTendons, RealTendons)

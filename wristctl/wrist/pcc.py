@@ -6,9 +6,8 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.named_tuples import replacing
-from wristctl.wrist.arcs import ARC_LIMIT, tip
-from wristctl.wrist.chain import bend_along, tip_derivatives
+from wristctl.wrist.arcs import ARC_LIMIT
+from wristctl.wrist.chain import bend_along, disturbed_chain
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import arcs_backbone, chain_tip
@@ -17,8 +16,6 @@ from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendon_mechanics import travel
 
-_load = replacing("stiffness", "force_y")
-
 
 @compiled
 def _within(plant: Any, q: Any) -> Any:
@@ -26,16 +23,6 @@ def _within(plant: Any, q: Any) -> Any:
     for k in range(1, len(q)):
         inside = inside & (abs(q[k]) < ARC_LIMIT)
     return inside
-
-
-@compiled
-def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
-    return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
-
-
-@compiled
-def _tip_pose(plant: Any, q: Any) -> Any:
-    return tip(q, plant.length)
 
 
 def check_even(wrist: WristParameters, n: int) -> None:
@@ -64,9 +51,7 @@ PCC = PlantModel(
     bend_of=bend_along,
     travel=travel,
     within=_within,
-    disturbed=_disturbed,
-    tip_pose=_tip_pose,
-    tip_jacobian=tip_derivatives,
+    disturbed=disturbed_chain,
     angle=lambda theta: theta.sum(axis=-1),
     tips=lambda wrist, theta: chain_tip(theta, wrist.length),
     taut=_taut,

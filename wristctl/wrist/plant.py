@@ -11,12 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
 from numba.core.registry import CPUDispatcher
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
+from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS as _TABLE
@@ -24,11 +25,10 @@ from wristctl.config.choices import PLANTS_IN_SPACE as _IN_SPACE
 from wristctl.config.choices import Choices
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
 from wristctl.lanes.compiled import by_type, implements, kernel, spelled_out
-from wristctl.lanes.lane import dot, planar, where, zero_like
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.lanes.rows import entries, lanes_like, part, rows_of
 from wristctl.wrist.kinematics import Backbone
 from wristctl.wrist.tendon_mechanics import (
     WRAPPED,
@@ -37,6 +37,7 @@ from wristctl.wrist.tendon_mechanics import (
     PulledTendons,
     RealTendons,
     X,
+    paths_of,
     row_of,
     update_memory,
 )
@@ -75,8 +76,6 @@ class PlantModel:
     coordinates (q,) and at shares (m,) of the way from the base to the tip."""
     read: Any = None
     """Function (model, rows, pulls) of compiled code that reads the parameters; None: each is a row."""
-    tip_pose: Any = None
-    tip_jacobian: Any = None
     angle: Callable[[Array], Array] = _unknown
     """Bending angles (...) [rad] of the last disc at coordinates (..., q); in two planes its bends (..., 2)."""
     taut: Callable[[WristParameters, Array], Array] = _unknown
@@ -88,7 +87,7 @@ class PlantModel:
     where the plant cannot tell."""
 
     def __post_init__(self) -> None:
-        for function in (advance, bend_of, travel, within, disturbed, tip_pose, tip_jacobian):
+        for function in (advance, bend_of, travel, within, disturbed):
             if (body := getattr(self, function.__name__)) is not None:
                 implements(function, self.parameters)(body)
 
@@ -164,26 +163,22 @@ def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: An
     `wristctl.wrist.integrator`'s. Returns an estimate of the step's error in the bending angle and in its rate
     [rad, rad/s], as an embedded solution of lower order gives it.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
     """Write the bend of the last disc [rad] and its rate [rad/s], a row for each plane."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def travel(plant: Any, q: Any) -> Any:
     """Shortening of the + and the - side's tendon paths from the straight wrist [m], and the bend that they are wrapped
     by [rad]; in two planes the shortening of each place's, then the bend that each is wrapped by."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def within(plant: Any, q: Any) -> Any:
     """Lanes in which the coordinates are ones that the plant can have."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
@@ -192,101 +187,44 @@ def disturbed(plant: Any, force: Any, scale: Any) -> Any:
 
     The force is along the straight wrist, across it toward positive bends, and aside, which one plane does not feel.
     """
-    raise NotImplementedError("compiled code only")
-
-
-@by_type
-def tip_pose(plant: Any, q: Any) -> Any:
-    """Centre of the last disc and the unit tangent there, planar."""
-    raise NotImplementedError("compiled code only")
-
-
-@by_type
-def tip_jacobian(plant: Any, q: Any, place: Any, angle: Any) -> None:
-    """Derivatives of the last disc's centre (planar rows) and of its angle (rows) by each coordinate."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def path_along(tendons: Any, plant: Any, q: Any) -> Any:
     """Path of the tendons at coordinates q, as the plant's `travel`; zeros where pulls are held, which need none."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def path_before(tendons: Any, plant: Any, q: Any) -> Any:
     """Path of the tendons before a step, at coordinates q; real tendons remember it from the step before."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(path_before, NoTendons, PulledTendons)
 @implements(path_along, NoTendons, PulledTendons)
-def no_path(tendons: Any, plant: Any, q: Any) -> Any:
-    """Zeros."""
+def _no_path(tendons: Any, plant: Any, q: Any) -> Any:
     zero = zero_like(q[0])
     return zero, zero, zero
 
 
 @implements(path_before, ElasticTendons)
 @implements(path_along, ElasticTendons, RealTendons)
-def travelled(tendons: Any, plant: Any, q: Any) -> Any:
-    """The plant's `travel`."""
+def _travelled(tendons: Any, plant: Any, q: Any) -> Any:
     return travel(plant, q)
 
 
 @implements(path_before, RealTendons)
 def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
-    state = tendons.state
-    return state[row_of(0, X)], state[row_of(1, X)], state[row_of(0, WRAPPED)]
+    path = lanes_like(part(tendons.state, 0, tendons.path))
+    shortened = paths_of(path)
+    for i in range(len(path)):
+        path[i] = tendons.state[row_of(i, X) if i < shortened else row_of(i - shortened, WRAPPED)]
+    return entries(path)
 
 
 @cache
 def kernel_of(function: Any, model: PlantModel) -> Any:
     """A function of Python as a kernel that moves plants of this model; its cache goes by that one's sources too."""
     return kernel(function, *model.sources)
-
-
-class Pose(NamedTuple):
-    """The last disc of a plant at coordinates (B, q)."""
-
-    tip: Array
-    """x, y [m] of its centre, (B, 2)."""
-    angle: Array
-    """(B,) [rad]"""
-    jacobian: Array
-    """Derivatives of x, y and angle by the coordinates, (B, 3, q)."""
-
-
-def _poses(model: Any, values: Any, states: Any, out: Any, cut: Any) -> None:
-    for block in range(states.shape[0]):
-        plant, result = parameters_of(model, rows_of(values)), rows_of(out[block])
-        n = len(cut)
-        q, rate = part(rows_of(states[block]), 0, cut), part(rows_of(states[block]), n, cut)
-        place, turning = planes_like(q), lanes_like(q)
-        bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
-        bend_of(plant, q, rate, bend, speed)
-        angle, zero = bend[0], speed[0]
-        position, _ = tip_pose(plant, q)
-        tip_jacobian(plant, q, place, turning)
-        along, across = planar(1.0 + zero, zero), planar(zero, 1.0 + zero)
-        result[0] = dot(position, along)
-        result[1] = dot(position, across)
-        result[2] = angle
-        for k in range(n):
-            result[3 + k] = dot(place[k], along)
-            result[3 + n + k] = dot(place[k], across)
-            result[3 + 2 * n + k] = turning[k]
-
-
-def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
-    """Pose of the last disc at coordinates q (B, q) of a wrist cut into n segments."""
-    count, k = q.shape
-    states = to_blocks(np.concatenate([q, np.zeros((count, k))], axis=1))
-    out = np.empty((len(states), 3 + 3 * k, *states.shape[2:]))
-    values = spread(model.values(wrist, n), width(count))[0]
-    kernel_of(_poses, model)(model, values, states, out, (0,) * k)
-    rows = to_rows(out, count)
-    return Pose(rows[:, :2], rows[:, 2], rows[:, 3:].reshape(count, 3, k))
 
 
 def _path_at(model: Any, values: Any, state: Any, out: Any, cut: Any, pulls: Any) -> None:
@@ -300,6 +238,35 @@ def path_at(model: PlantModel, values: Array, q: Array, places: int) -> Array:
     out = np.empty(3 if model.planes == 1 else 2 * places)
     kernel_of(_path_at, model)(model, values, np.ascontiguousarray(q, float), out, (0,) * len(q), (0,) * places)
     return out
+
+
+def _integrate(model: Any, values: Any, pulls: Any, h: float, steps: Any, out: Any, cut: Any, places: Any) -> None:
+    plant, held, m = parameters_of(model, rows_of(values), places), part(rows_of(pulls), 0, places), len(cut)
+    for sample in range(steps.shape[0]):
+        state, before = rows_of(out[sample + 1]), rows_of(out[sample])
+        for i in range(2 * m):
+            state[i] = before[i]
+        q, rate = part(state, 0, cut), part(state, m, cut)
+        for _ in range(steps[sample]):
+            advance(plant, q, rate, held, NoTendons(), h + zero_like(held[0]))
+
+
+def integrate(
+    model: PlantModel, values: Array, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
+) -> tuple[Array, Array]:
+    """Motion from one state under held pulls [N] of each place: coordinates and rates (K, q) at K times [s].
+
+    Steps of h; every time must be a whole number of steps.
+    """
+    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
+    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
+        raise ValueError(f"times must be whole numbers of steps of {h} s")
+    begin, held = np.concatenate([q, rate]).astype(float), np.ascontiguousarray(pulls, float)
+    out, m = np.empty((len(counts) + 1, len(begin))), len(begin) // 2
+    out[0] = begin
+    shapes = (0,) * m, (0,) * len(held)
+    kernel_of(_integrate, model)(model, values, held, h, np.diff(counts, prepend=0), out, *shapes)
+    return out[1:, :m], out[1:, m:]
 
 
 @spelled_out

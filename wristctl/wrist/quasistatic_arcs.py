@@ -107,18 +107,6 @@ class QuasistaticArcs:
 
 
 @compiled
-def _copy(source: Any, into: Any) -> None:
-    for i in range(len(into)):
-        into[i] = source[i]
-
-
-@compiled
-def _clear(values: Any) -> None:
-    for i in range(len(values)):
-        values[i] = 0.0
-
-
-@compiled
 def _solve(matrix: Any, right: Any) -> None:
     """Solution of matrix x = right, into `right`; by Gauss's elimination with pivots."""
     n = len(right)
@@ -213,12 +201,12 @@ def _rest(reeled: Any, arms: Any, stiffness: Any, tendon: Any, ways: Any, pause:
         for sample in range(reeled.shape[1]):
             if math.isnan(pause[sample]):
                 for memory in (q, crept, inside, path, z):
-                    _clear(memory)
+                    memory[:] = 0.0
             since = _even_samples(pause, sample, since)
-            _copy(before, older)
-            _copy(q, before)
+            older[:] = before
+            before[:] = q
             if v > 0:  # variants are alike: the first one's rest is near
-                _copy(out[0, sample], q)
+                q[:] = out[0, sample]
             for _ in range(_ITERATIONS):
                 for i in range(count):
                     for j in range(count):
@@ -297,12 +285,12 @@ def _rest(reeled: Any, arms: Any, stiffness: Any, tendon: Any, ways: Any, pause:
                 z[t], _ = _turned(z[t], shorter - path[t], bristle)
                 path[t] = shorter
             if inertia > 0.0:
-                _copy(rate_before, rate_older)
+                rate_older[:] = rate_before
                 for i in range(2 * arcs):
                     rate_before[i], _ = _difference(q[i], before[i], older[i], since, pause[sample])
-            _copy(inside_now, inside)
+            inside[:] = inside_now
             if creep > 0.0 and not math.isnan(pause[sample]):
                 kept = math.exp(-pause[sample] / creep_time)
                 for i in range(bends):
                     crept[i] = q[i] + (crept[i] - q[i]) * kept
-            _copy(q, out[v, sample])
+            out[v, sample] = q

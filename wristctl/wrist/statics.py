@@ -211,21 +211,32 @@ def _held_to(wrist: WristParameters, theta: float, force: float) -> float:
     return float(way[first - 1] + share * (way[first] - way[first - 1]))
 
 
+# Step of difference quotients [rad].
+_SMALL = 1e-6
 # States of the + and the - side's bristle.
 FROM_BELOW, FROM_ABOVE, UNBENT = (1.0, -1.0), (-1.0, 1.0), (0.0, 0.0)
 
 
 class HeldTendons(NamedTuple):
-    """Tendons of both sides of wrists at rest, one value a wrist (B,)."""
+    """Tendons of wrists (B,) at rest on what holds them; in one plane the places are both sides."""
 
     given: Array
-    """(B, 2) what both sides have reeled in since they were taut and free of tension on the straight wrist [m]; pulls
-    at the spools [N] where these are held."""
+    """(B, T) what the tendons of each place have reeled in since they were taut and free of tension on the straight
+    wrist [m]; pulls at the spools [N] where these are held."""
     stiffness: Array
-    """Stiffness of a side's tendons together [N/m]; 0 where pulls are held."""
+    """Stiffness of a place's tendons together [N/m], (B, 1) or (T,); 0 where pulls are held."""
     friction: Array
     sheath: Array
     """[rad]"""
+
+    def pulls(self, shorter: Array, wrapped: Array, z: Array) -> Array:
+        """Pulls at the wrist (B, T) [N] on paths that are so much shorter (B, T) [m] and wrapped by bends [rad].
+
+        `z` are the states of the bristles.
+        """
+        at_spool = np.where(self.stiffness > 0.0, self.stiffness * (self.given - shorter).clip(0.0), self.given)
+        pulls: Array = at_spool * np.exp(-self.friction[:, None] * (self.sheath[:, None] + wrapped) * z)
+        return pulls
 
 
 def at_rest_with(parameters: Array, tendons: HeldTendons, z: tuple[float, float], guess: Array) -> Array:
@@ -233,27 +244,32 @@ def at_rest_with(parameters: Array, tendons: HeldTendons, z: tuple[float, float]
 
     `parameters` are rows of Segments, (B, 12). Raises UserError where there is no such rest.
     """
-    theta: Array = np.array(guess, float)
-    still, side = 0.0 * theta, np.asarray(z)
-    length = parameters[:, Segments._fields.index("length")] * theta.shape[1]
-    springy, held = tendons.stiffness[:, None] > 0.0, tendons.stiffness[:, None] <= 0.0
+    still = 0.0 * guess
+    length = parameters[:, Segments._fields.index("length")] * guess.shape[1]
+
+    def residual(theta: Array) -> Array:
+        shorter = length[:, None] - terms(parameters, theta, still).tendon_lengths.sum(axis=1)
+        pulls = tendons.pulls(shorter, np.abs(theta).sum(axis=1, keepdims=True), np.asarray(z))
+        return linearised(parameters, theta, still, still, pulls)[0]
+
+    return at_rest_where(residual, guess)
+
+
+def at_rest_where(residual: Callable[[Array], Array], guess: Array) -> Array:
+    """Coordinates (B, m) at which residuals (B, m) [N m] of wrists are 0, by Newton's method from a guess.
+
+    Raises UserError where there is no such rest.
+    """
+    x, steps = np.array(guess, float), _SMALL * np.eye(guess.shape[1])
     for _ in range(100):
-        at_theta = terms(parameters, theta, still)
-        stretch = tendons.given - (length[:, None] - at_theta.tendon_lengths.sum(axis=1))
-        at_spool = np.where(held, tendons.given, tendons.stiffness[:, None] * stretch.clip(0.0))
-        wrapped = tendons.sheath + np.abs(theta).sum(axis=1)
-        left = np.exp(-tendons.friction[:, None] * wrapped[:, None] * side)
-        pulls = at_spool * left
-        r, tangent, _ = linearised(parameters, theta, still, still, pulls)
-        stiff = np.where(springy & (stretch > 0.0), tendons.stiffness[:, None] * left, 0.0)
-        arms = at_theta.moment_arms
-        softer = (tendons.friction[:, None] * side * pulls)[:, None, :] * np.sign(theta)[:, :, None]
-        slope = stiff[:, None, :] * arms + softer
-        tangent = tangent + np.einsum("bis,bjs->bij", arms, slope)
-        change = np.linalg.solve(tangent, -r[..., None])[..., 0]
-        theta = theta + change * np.minimum(1.0, 0.3 / np.abs(change).max(axis=1, initial=1e-300))[:, None]
-        if np.abs(change).max() < 1e-13:
-            return theta
-    raise UserError(
-        "no rest was found on held tendons with this friction", "wrist", "less friction, sheath or bend, or more pull"
-    )
+        r = residual(x)
+        columns = [(residual(x + step) - residual(x - step)) / (2.0 * _SMALL) for step in steps]
+        change = np.linalg.solve(np.stack(columns, axis=2), -r[..., None])[..., 0]
+        largest = np.abs(change).max(axis=1, initial=1e-300)
+        x = x + change * np.minimum(1.0, 0.3 / largest)[:, None]
+        if largest.max() < 1e-12:
+            break
+    if not np.abs(residual(x)).max() < 1e-9:
+        fix = "less friction, sheath or bend, or more pull"
+        raise UserError("no rest was found on held tendons with this friction", "wrist", fix)
+    return x

@@ -1,8 +1,8 @@
 """Tendons between spools and wrist, as the integration step evaluates them.
 
 What there is follows from a type. NoTendons and PulledTendons hold pulls [N] over a step, ElasticTendons and
-RealTendons the lengths [m] that spools have reeled in. Either is the step's `spool_input`, (plus, minus) of one tendon
-a side, or of RealTendons twice that of two alike.
+RealTendons the lengths [m] that spools have reeled in. Either is the step's `spool_input`, a row for each place of
+tendons: in one plane (plus, minus) of one tendon a side, or twice that of two alike.
 
 Where a path is shorter by x a tendon of stiffness k that has reeled in l is stretched by e = l - x, pulls
 k max(e - f psi, 0) at its spool, never pushes, and pulls less at the wrist by its friction. psi is
@@ -12,11 +12,11 @@ Springs creep alike.
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, itself, nothing
 from wristctl.lanes.functions import exp, maximum
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import lanes_like, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.wrist.chain import lengths, moment_arms
 from wristctl.wrist.dahl import bristle, bristle_slope, inner_in_lanes, remember_bend
 
@@ -63,7 +63,7 @@ class Nonideal(NamedTuple):
 
 class Fault(NamedTuple):
     """When a place's tendons break and slip [s], what share of them a break leaves, and the pull [N] at which their
-    standing motor falls out of step; lanes, or in two planes a row for each place."""
+    standing motor falls out of step; a row for each place."""
 
     broken_at: Any
     left: Any
@@ -91,24 +91,33 @@ class PulledTendons(NamedTuple):
     creep of tendons need stays as it is."""
 
     nonideal: Any
+    faults: Any
+    """Fault of each place; in one block's arrays rows."""
     state: Any
     inner: Any
     """InnerFriction of the wrist, or NoInnerFriction."""
+    pulls: Any
+    """In one block's arrays a tuple with an entry for each place."""
 
 
 class ElasticTendons(NamedTuple):
-    """One tendon a side that only stretches: its stiffness [N/m]."""
+    """Tendons that only stretch: the stiffness of all of each place [N/m], T rows; `pulls` as of PulledTendons."""
 
     stiffness: Any
+    pulls: Any
 
 
 class RealTendons(NamedTuple):
-    """Tendons with friction, creep and faults: the stiffness of each [N/m], Nonideal, their state, inner friction."""
+    """Tendons with friction, creep and faults: the stiffness of all of each place [N/m], T rows, as long as they are
+    whole, Nonideal, and the rest as of PulledTendons; `path` is a tuple with an entry for each value of their path."""
 
     stiffness: Any
     nonideal: Any
+    faults: Any
     state: Any
     inner: Any
+    pulls: Any
+    path: Any
 
 
 Tendons = NoTendons | PulledTendons | ElasticTendons | RealTendons
@@ -117,31 +126,40 @@ Tendons = NoTendons | PulledTendons | ElasticTendons | RealTendons
 @by_type
 def tendons_in_lanes(tendons: Any) -> Any:
     """Tendons of lanes from tendons of one block's arrays."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(tendons_in_lanes, NoTendons)
-def _none(tendons: Any) -> Any:
-    return tendons
+implements(tendons_in_lanes, NoTendons)(itself)
+
+
+@compiled
+def read_faults(rows: Any, pulls: Any) -> Any:
+    """Fault with rows for each place, of rows one after the other."""
+    count = len(pulls)
+    return Fault(
+        part(rows, 0, pulls), part(rows, count, pulls), part(rows, 2 * count, pulls), part(rows, 3 * count, pulls)
+    )
 
 
 @implements(tendons_in_lanes, PulledTendons)
 def _pulled(tendons: Any) -> Any:
     return PulledTendons(
-        read_nonideal(rows_of(tendons.nonideal)), rows_of(tendons.state), inner_in_lanes(tendons.inner)
-    )
+        read_nonideal(rows_of(tendons.nonideal)), read_faults(rows_of(tendons.faults), tendons.pulls),
+        rows_of(tendons.state), inner_in_lanes(tendons.inner), tendons.pulls,
+    )  # fmt: skip
 
 
 @implements(tendons_in_lanes, ElasticTendons)
 def _elastic(tendons: Any) -> Any:
-    return ElasticTendons(rows_of(tendons.stiffness)[0])
+    return ElasticTendons(part(rows_of(tendons.stiffness), 0, tendons.pulls), tendons.pulls)
 
 
 @implements(tendons_in_lanes, RealTendons)
 def _real(tendons: Any) -> Any:
-    nonideal = read_nonideal(rows_of(tendons.nonideal))
-    inner = inner_in_lanes(tendons.inner)
-    return RealTendons(rows_of(tendons.stiffness)[0], nonideal, rows_of(tendons.state), inner)
+    return RealTendons(
+        part(rows_of(tendons.stiffness), 0, tendons.pulls), read_nonideal(rows_of(tendons.nonideal)),
+        read_faults(rows_of(tendons.faults), tendons.pulls), rows_of(tendons.state), inner_in_lanes(tendons.inner),
+        tendons.pulls, tendons.path,
+    )  # fmt: skip
 
 
 def state_rows(tendons: int, coordinates: int) -> int:
@@ -156,7 +174,7 @@ def row_of(t: int, which: int) -> int:
 
 
 @compiled
-def _paths(path: Any) -> int:
+def paths_of(path: Any) -> int:
     """How many tendons have a path of their own: of (plus, minus, bend) 2, of T paths and T bends T."""
     return (len(path) + 1) // 2
 
@@ -164,13 +182,13 @@ def _paths(path: Any) -> int:
 @compiled
 def shortening(path: Any, t: int) -> Any:
     """Shortening of a tendon's path from the straight wrist [m]; tendons of one side have one path."""
-    return path[t % _paths(path)]
+    return path[t % paths_of(path)]
 
 
 @compiled
 def wrapped_by(path: Any, t: int) -> Any:
     """Bend that a tendon is wrapped by [rad]: its own, or that of all."""
-    return path[_paths(path) + t % (len(path) - _paths(path))]
+    return path[paths_of(path) + t % (len(path) - paths_of(path))]
 
 
 @compiled
@@ -186,17 +204,6 @@ def travel(segment: Any, theta: Any) -> Any:
     return plus, minus, bend
 
 
-@by_type
-def stiffness_at(tendons: Any, t: int) -> Any:
-    """Stiffness of one tendon, or of all of its place [N/m], as long as they are whole."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(stiffness_at, ElasticTendons, RealTendons)
-def _stiffness_of_all(tendons: Any, t: int) -> Any:
-    return tendons.stiffness
-
-
 @compiled
 def _slid(tendons: Any, t: int, x: Any) -> Any:
     return bristle(tendons.state[row_of(t, Z)], x - tendons.state[row_of(t, X)], tendons.nonideal.bristle)
@@ -207,7 +214,7 @@ def spool_pull(tendons: Any, length: Any, t: int, x: Any) -> Any:
     """Pull [N] at its spool of one real tendon that has reeled in a length [m]."""
     state = tendons.state
     elongation = (length - x) - tendons.nonideal.tendon_creep * state[row_of(t, CREPT)]
-    return rounded(state[row_of(t, SHARE)] * stiffness_at(tendons, t) * maximum(0.0, elongation))
+    return rounded(state[row_of(t, SHARE)] * tendons.stiffness[t] * maximum(0.0, elongation))
 
 
 @compiled
@@ -220,38 +227,32 @@ def _at_wrist(tendons: Any, length: Any, t: int, path: Any, z: Any) -> Any:
 @by_type
 def pull_along(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
     """Pull [N] of one tendon at the wrist, at a path within a step."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def pull_at_start(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
     """Pull [N] of one tendon at the wrist at the start of a step, where it has not slid yet."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(pull_at_start, NoTendons, PulledTendons)
 @implements(pull_along, NoTendons, PulledTendons)
-def held_pull(tendons: Any, pulls: Any, t: int, path: Any) -> Any:
-    """A pull that is held."""
+def _held_pull(tendons: Any, pulls: Any, t: int, path: Any) -> Any:
     return pulls[t]
 
 
 @implements(pull_at_start, ElasticTendons)
 @implements(pull_along, ElasticTendons)
-def stretch_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
-    """Pull of a tendon that only stretches."""
-    return rounded(stiffness_at(tendons, t) * maximum(0.0, reeled[t] - shortening(path, t)))
+def _stretch_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
+    return rounded(tendons.stiffness[t] * maximum(0.0, reeled[t] - shortening(path, t)))
 
 
 @implements(pull_along, RealTendons)
-def slid_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
-    """Pull of a real tendon that has slid."""
+def _slid_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
     return _at_wrist(tendons, reeled[t], t, path, _slid(tendons, t, shortening(path, t)))
 
 
 @implements(pull_at_start, RealTendons)
-def stuck_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
-    """Pull of a real tendon that has not slid."""
+def _stuck_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
     return _at_wrist(tendons, reeled[t], t, path, tendons.state[row_of(t, Z)])
 
 
@@ -285,22 +286,21 @@ def pulls_at_start(tendons: Any, spool_input: Any, path: Any) -> Any:
 @by_type
 def pull_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     """Fall of one tendon's pull with its path's shortening at the start of a step [N/m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(pull_slope, ElasticTendons)
-def stretch_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+def _stretch_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     """Of a tendon that only stretches its stiffness, while it is taut."""
-    return where(length - shortening(path, t) > 0.0, stiffness_at(tendons, t), 0.0)
+    return where(length - shortening(path, t) > 0.0, tendons.stiffness[t], 0.0)
 
 
 @implements(pull_slope, RealTendons)
-def slid_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+def _slid_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     """Of a real tendon also the slope of its friction."""
     nonideal, state = tendons.nonideal, tendons.state
     z, wrapped = state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + wrapped_by(path, t))
     pull = spool_pull(tendons, length, t, shortening(path, t))
-    taut = where(pull > 0.0, state[row_of(t, SHARE)] * stiffness_at(tendons, t), 0.0)
+    taut = where(pull > 0.0, state[row_of(t, SHARE)] * tendons.stiffness[t], 0.0)
     sliding = pull * wrapped * bristle_slope(z, speed, nonideal.bristle)
     return (taut + sliding) * capstan(wrapped, 1.0, z)
 
@@ -308,12 +308,9 @@ def slid_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
 @by_type
 def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, path: Any, by_theta: Any) -> None:
     """Add to dr/d(theta) (n, n) what tendons on held spools add: arm_i (-dT/dx) arm_j of each."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(stiffen, NoTendons, PulledTendons)
-def _stiffen_nothing(tendons: Any, segment: Any, theta: Any, omega: Any, pulls: Any, path: Any, by_theta: Any) -> None:
-    pass
+implements(stiffen, NoTendons, PulledTendons)(nothing)
 
 
 @implements(stiffen, ElasticTendons, RealTendons)
@@ -339,17 +336,14 @@ def _stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, reeled: Any, pa
 @by_type
 def update_memory(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     """Take the state over to the end of a step, at coordinates theta with this path."""
-    raise NotImplementedError("compiled code only")
 
 
-@implements(update_memory, NoTendons, ElasticTendons)
-def update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
-    """There is no state."""
+implements(update_memory, NoTendons, ElasticTendons)(nothing)
 
 
 @implements(update_memory, PulledTendons)
 @compiled
-def update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+def _update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     """Springs creep, and the bristles of inner friction turn."""
     state = tendons.state
     for k in range(len(theta)):
@@ -360,7 +354,7 @@ def update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
 
 @implements(update_memory, RealTendons)
 @compiled
-def update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
+def _update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
     """Tendons have slid and creep, beside the wrist's own."""
     nonideal, state = tendons.nonideal, tendons.state
     for t in range(len(reeled)):
@@ -370,4 +364,4 @@ def update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
         state[crept] = stretch + nonideal.tendon_keep * (state[crept] - stretch)
         state[row_of(t, X)] = x
         state[row_of(t, WRAPPED)] = wrapped_by(path, t)
-    update_wrist(tendons, theta, reeled, path)
+    _update_wrist(tendons, theta, reeled, path)

@@ -15,7 +15,7 @@ TENDONS_PER_SIDE = 2
 
 
 @compiled
-def moment_arms(theta: Any, segment: Any) -> Any:
+def moment_arms(segment: Any, theta: Any) -> Any:
     """Moment arms of the + and the - side of one segment [m]: +-c cos(y) + (l/2g) y E1(y)."""
     y = (0.5 / segment.spans) * theta
     e0, e1, _, _ = bessel(y)
@@ -25,7 +25,7 @@ def moment_arms(theta: Any, segment: Any) -> Any:
 
 
 @compiled
-def lengths(theta: Any, segment: Any) -> Any:
+def lengths(segment: Any, theta: Any) -> Any:
     """Lengths of the + and the - side of one segment [m]: l E0(y) -+ 2 g c sin(y)."""
     y = (0.5 / segment.spans) * theta
     e0 = bessel(y)[0]
@@ -34,7 +34,7 @@ def lengths(theta: Any, segment: Any) -> Any:
 
 
 @compiled
-def tendon_torques(theta: Any, segment: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
+def tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
     """Torque of both sides' pulls [N] on each segment and its derivative by that segment's theta, into two rows."""
     half_span = (0.5 / segment.spans) * segment.length
     bend, squeeze = segment.tendon_offset * (plus - minus), half_span * (plus + minus)
@@ -49,21 +49,14 @@ def tendon_torques(theta: Any, segment: Any, plus: Any, minus: Any, torque: Any,
 @compiled
 def reach(theta: Any, wrist: Any, low: Any, high: Any) -> Any:
     """Least and largest torque [N m] at theta with both sides' pulls between low and high [N]."""
-    plus, minus = moment_arms(theta, wrist)
+    plus, minus = moment_arms(wrist, theta)
     return plus * low + minus * high, plus * high + minus * low
 
 
 @compiled
 def allocate(theta: Any, wrist: Any, torque: Any, low: Any, high: Any) -> Any:
     """Pulls of the + and the - side [N] that give the torque nearest to the wanted one, with one side at `low`."""
-    plus, minus = moment_arms(theta, wrist)
+    plus, minus = moment_arms(wrist, theta)
     forward = torque > (plus + minus) * low
     needed = clip((torque - where(forward, minus, plus) * low) / where(forward, plus, minus), low, high)
     return where(forward, needed, low), where(forward, low, needed)
-
-
-@compiled
-def torque_of(theta: Any, wrist: Any, plus: Any, minus: Any) -> Any:
-    """Torque [N m] of both sides' pulls [N] on the one-segment wrist ("force": A_b F_t)."""
-    arm_plus, arm_minus = moment_arms(theta, wrist)
-    return arm_plus * plus + arm_minus * minus

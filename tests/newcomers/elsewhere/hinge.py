@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
-from wristctl.lanes.lane import planar, turn
 from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist.kinematics import Planar
 from wristctl.wrist.plant import PlantModel
@@ -114,20 +113,6 @@ def _disturbed(rod: Any, force: Any, scale: Any) -> Any:
     return _loaded(rod, (scale * rod.stiffness, force[1] + rod.force))
 
 
-@compiled
-def _tip_pose(rod: Any, q: Any) -> Any:
-    cosine, sine = _direction(q[0])
-    along = planar(cosine, sine)
-    return rod.length * along, along
-
-
-@compiled
-def _tip_jacobian(rod: Any, q: Any, place: Any, angle: Any) -> None:
-    cosine, sine = _direction(q[0])
-    place[0] = rod.length * turn(planar(cosine, sine))
-    angle[0] = 1.0 + 0.0 * cosine
-
-
 def _tips(wrist: WristParameters, q: Array) -> Array:
     return wrist.length * np.stack([np.cos(q[:, 0]), np.sin(q[:, 0])], axis=-1)
 
@@ -151,8 +136,6 @@ HINGE = PlantModel(
     travel=_travel,
     within=_within,
     disturbed=_disturbed,
-    tip_pose=_tip_pose,
-    tip_jacobian=_tip_jacobian,
     angle=lambda q: q[..., 0],
     tips=_tips,
     taut=_taut,

@@ -92,7 +92,7 @@ def _keep(series: Any, k: int, c: Any) -> None:
 
 @compiled
 def bend_segments(segment: Any, q: Any, posture: Any) -> Any:
-    """The posture at coordinates q; the last tangent."""
+    """The posture at coordinates q; the last tangent, and the normals (n_y, n_z) there."""
     zero = zero_like(segment.length)
     tangent, end = space(1.0 + zero, zero, zero), space(zero, zero, zero)
     across_y, across_z = space(zero, 1.0 + zero, zero), space(zero, zero, 1.0 + zero)
@@ -127,26 +127,7 @@ def bend_segments(segment: Any, q: Any, posture: Any) -> Any:
         tangent = c.c0 * tangent + c.c1 * nu
         across_y = across_y - bend_y * both
         across_z = across_z - bend_z * both
-    return tangent
-
-
-@compiled
-def spatial_tip(segment: Any, q: Any) -> Any:
-    """Centre of the last disc [m], and the unit tangent and normals (n_y, n_z) there."""
-    zero = zero_like(segment.length)
-    tangent, end = space(1.0 + zero, zero, zero), space(zero, zero, zero)
-    across_y, across_z = space(zero, 1.0 + zero, zero), space(zero, zero, 1.0 + zero)
-    for k in range(len(q) // 2):
-        bend_y, bend_z = q[2 * k], q[2 * k + 1]
-        c = stumpff(bend_y * bend_y + bend_z * bend_z)
-        nu = bend_y * across_y + bend_z * across_z
-        part = chord_of(segment, c)
-        both = c.c1 * tangent + c.c2 * nu
-        end = end + chord_unit(segment) * (part.along * tangent + part.lean * nu)
-        tangent = c.c0 * tangent + c.c1 * nu
-        across_y = across_y - bend_y * both
-        across_z = across_z - bend_z * both
-    return end, tangent, across_y, across_z
+    return tangent, across_y, across_z
 
 
 # Square of the tangent's part across below which the bend's slope is that of the straight wrist.

@@ -30,19 +30,16 @@ class Chord(NamedTuple):
 @by_type
 def chord_unit(segment: Any) -> Any:
     """Length that chords are told in [m]."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def chord_of(segment: Any, c: Any) -> Any:
     """Chord of a part, from Stumpff's functions c of its bend."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def springs_of(segment: Any, k: int) -> Any:
     """Stiffness of the part k from the base: yy, yz and zz [N m/rad]."""
-    raise NotImplementedError("compiled code only")
 
 
 @implements(chord_unit, SpatialSegments)

@@ -198,7 +198,7 @@ class BentWrist(NamedTuple):
 def bent_wrist(wrist: Any, q: Any, pulls: Any, mass: Any) -> Any:
     """The wrist at coordinates q under pulls [N] of each tendon; M into `mass`."""
     posture, torques, momenta = posture_like(q), torques_like(q), momenta_like(q)
-    tangent = bend_segments(wrist.segment, q, posture)
+    tangent, _, _ = bend_segments(wrist.segment, q, posture)
     tendons_torques(wrist, q, pulls, torques)
     spatial_mass_matrix(wrist.segment, posture, tangent, mass, momenta)
     return BentWrist(posture, tangent, momenta, torques)

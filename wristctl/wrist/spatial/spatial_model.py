@@ -14,13 +14,12 @@ from wristctl.lanes.blocks import spread, to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of, square_like
-from wristctl.wrist.spatial.posture import bend_segments, posture_like, spatial_tip, tip_bend
+from wristctl.wrist.compiled_model import linearised_by
+from wristctl.wrist.spatial.posture import bend_segments, posture_like, tip_bend
 from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, momenta_like, spatial_bias, spatial_mass_matrix
 from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
 from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, SpatialWrist, load_spatial_segments
-from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
-from wristctl.wrist.tendon_mechanics import NoTendons
 
 
 class SpatialTerms(NamedTuple):
@@ -55,11 +54,10 @@ def _terms(parameters: Any, states: Any, out: Any, cut: Any, of_tendons: Any, of
         zero = zero_like(segment.length)
         for i in range(m):
             nothing[i] = zero
-        tangent = bend_segments(segment, q, posture)
+        tangent, across_y, across_z = bend_segments(segment, q, posture)
         spatial_mass_matrix(segment, posture, tangent, mass, momenta)
         spatial_bias(segment, q, rate, posture, tangent, nothing, r)
-        tip, along, across_y, across_z = spatial_tip(segment, q)
-        for i, v in enumerate((tip, along, across_y, across_z)):
+        for i, v in enumerate((posture.end[m // 2 - 1], tangent, across_y, across_z)):
             result[3 * i] = v.x
             result[3 * i + 1] = v.y
             result[3 * i + 2] = v.z
@@ -148,51 +146,6 @@ def spatial_linearised(
     parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, acceleration: ArrayLike, pulls: ArrayLike
 ) -> tuple[Array, Array, Array]:
     """Residual M q'' + r (..., 2n) and its derivatives by q and by the rate (..., 2n, 2n), under pulls (..., T) [N]."""
-    q, rate, acceleration = np.broadcast_arrays(q, rate, acceleration)
-    *batch, m = q.shape
-    values, shapes = _shapes(parameters, q)
-    count = len(shapes[2])
-    pulls = np.broadcast_to(np.asarray(pulls, float), (*batch, count))
-    states = np.concatenate([q, rate, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * m + count)
-    blocks = to_blocks(states)
-    out = np.empty((len(blocks), m + 2 * m * m, *blocks.shape[2:]))
-    _linearised(spread(values, len(states)), blocks, out, *shapes)
-    rows = to_rows(out, len(states)).reshape(*batch, -1)
-    r, by_q, by_rate = np.split(rows, [m, m + m * m], axis=-1)
-    return r, by_q.reshape(*batch, m, m), by_rate.reshape(*batch, m, m)
-
-
-@kernel
-def _integrate(
-    parameters: Any, pulls: Any, h: float, steps: Any, out: Any, cut: Any, of_tendons: Any, of_pulls: Any
-) -> None:
-    values = rows_of(parameters)
-    wrist = SpatialWrist(load_spatial_segments(values), part(values, FIELDS, of_tendons))
-    held, m = part(rows_of(pulls), 0, of_pulls), len(cut)
-    for sample in range(steps.shape[0]):
-        state, before = rows_of(out[sample + 1]), rows_of(out[sample])
-        for i in range(2 * m):
-            state[i] = before[i]
-        q, rate = part(state, 0, cut), part(state, m, cut)
-        for _ in range(steps[sample]):
-            spatial_step(wrist, q, rate, held, NoTendons(), h + zero_like(wrist.segment.length))
-
-
-def spatial_integrate(
-    parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
-) -> tuple[Array, Array]:
-    """Motion from one state under held pulls [N] of the T tendons: coordinates and rates (K, 2n) at K times [s].
-
-    Steps of h; every time must be a whole number of steps.
-    """
-    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
-    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
-        raise ValueError(f"times must be whole numbers of steps of {h} s")
-    q = np.asarray(q, float)
-    values, shapes = _shapes(parameters, q)
-    m = q.shape[-1]
-    out = np.empty((len(counts) + 1, 2 * m))
-    out[0] = np.concatenate([q, np.asarray(rate, float)])
-    held, row = np.ascontiguousarray(pulls, float), np.ascontiguousarray(values[0])
-    _integrate(row, held, h, np.diff(counts, prepend=0), out, *shapes)
-    return out[1:, :m], out[1:, m:]
+    values, (_, of_tendons, of_pulls) = _shapes(parameters, np.asarray(q))
+    motion = q, rate, acceleration
+    return linearised_by(_linearised, values, motion, pulls, len(of_pulls), of_tendons, of_pulls)

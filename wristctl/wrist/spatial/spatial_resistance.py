@@ -6,17 +6,27 @@ the torque of one plane's stop at that depth. Springs creep by each coordinate; 
 
 from typing import Any
 
-from wristctl.lanes.compiled import compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, nothing
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
 from wristctl.wrist.dahl import direction_of, resist, resist_slope
-from wristctl.wrist.integrator import stay, stay_jacobians, stop_contact, yield_, yield_jacobians
+from wristctl.wrist.integrator import stop_contact
 from wristctl.wrist.spatial.spatial_chain import springs_of
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
-from wristctl.wrist.tendon_mechanics import row_of
+from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, row_of
 
-implements(yield_, ElasticPlaces)(stay)
-implements(yield_jacobians, ElasticPlaces)(stay_jacobians)
+
+@by_type
+def yield_in_space(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, r: Any) -> None:
+    """`wristctl.wrist.integrator.yield_` of a wrist in two planes."""
+
+
+@by_type
+def yield_jacobians_in_space(tendons: Any, q: Any, rate: Any, by_q: Any, by_rate: Any) -> None:
+    """`wristctl.wrist.integrator.yield_jacobians` of a wrist in two planes."""
+
+
+implements(yield_in_space, NoTendons, ElasticTendons)(nothing)
+implements(yield_jacobians_in_space, NoTendons, ElasticTendons)(nothing)
 
 
 @compiled
@@ -27,8 +37,8 @@ def _depth(nonideal: Any, q: Any, rate: Any, k: int) -> Any:
     return depth, y * rate[2 * k] + z * rate[2 * k + 1], y, z, size
 
 
-@implements(yield_, PulledPlaces, RealPlaces)
-def _yield_in_space(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, r: Any) -> None:
+@implements(yield_in_space, PulledTendons, RealTendons)
+def _yield(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, r: Any) -> None:
     nonideal, state, springs = tendons.nonideal, tendons.state, row_of(len(spool_input), 0)
     for k in range(len(q) // 2):
         depth, closing, along_y, along_z, _ = _depth(nonideal, q, rate, k)
@@ -41,8 +51,8 @@ def _yield_in_space(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: An
     resist(tendons.inner, q, r)
 
 
-@implements(yield_jacobians, PulledPlaces, RealPlaces)
-def _yield_jacobians_in_space(tendons: Any, q: Any, rate: Any, by_q: Any, by_rate: Any) -> None:
+@implements(yield_jacobians_in_space, PulledTendons, RealTendons)
+def _yield_jacobians(tendons: Any, q: Any, rate: Any, by_q: Any, by_rate: Any) -> None:
     for k in range(len(q) // 2):
         depth, closing, along_y, along_z, size = _depth(tendons.nonideal, q, rate, k)
         torque, stiffness, damping = stop_contact(tendons.nonideal, len(q) // 2, depth, closing)

@@ -1,6 +1,5 @@
 """Statics of the wrist in two planes: rest under tensions and loads or on held spools, stiffness and buckling."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
-from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, own_values
-from wristctl.wrist.statics import settled
+from wristctl.wrist.spatial.spatial_segments import own_values
+from wristctl.wrist.statics import HeldTendons, at_rest_where, settled
 from wristctl.wrist.tendon_layout import TendonLayout
 
 _STEPS = 100
@@ -118,88 +116,20 @@ def spatial_equilibria_at(parameters: Array, n: int, bends: Array, arms: Array, 
     return SpatialEquilibria(q, pulls, found, found & (smallest > 0.0))
 
 
-class FrictionOnHeld(NamedTuple):
-    """Tendons of B wrists on what holds them, as `wristctl.wrist.statics.HeldTendons` in one plane.
-
-    `given` (B, T) is what each place has reeled in [m], or its pull at the spool [N]; `stiffness` (T,) that of all
-    tendons of a place [N/m], or None where pulls are held; friction and sheath [rad] are (B,).
-    """
-
-    given: Array
-    stiffness: Array | None
-    friction: Array
-    sheath: Array
-
-
-def at_rest_along(wrist: WristParameters, n: int, held: FrictionOnHeld, motion: Array, guess: Array) -> Array:
+def at_rest_along(wrist: WristParameters, n: int, held: HeldTendons, motion: Array, guess: Array) -> Array:
     """Coordinates (B, 2n) [rad] at rest on held tendons whose bristles a motion (B, 2n) there has bent fully.
 
     By Newton's method from a guess (B, 2n). Raises UserError where there is no such rest.
     """
     values, layout = own_values(wrist, n), TendonLayout.of(wrist)
     spanned = np.clip(n * layout.shares(wrist.discs)[:, None] - np.arange(n), 0.0, 1.0)
-    straight = layout.shares(wrist.discs) * wrist.length
-    travel = np.einsum("btq,bq->bt", spatial_terms(values, guess, 0.0 * guess).moment_arms, motion)
+    straight, still = layout.shares(wrist.discs) * wrist.length, 0.0 * guess
+    travel = np.einsum("btq,bq->bt", spatial_terms(values, guess, still).moment_arms, motion)
     z = np.sign(np.where(np.abs(travel) > _STILL * np.abs(travel).max(axis=1, keepdims=True), travel, 0.0))
 
     def residual(q: Array) -> Array:
-        stretch = held.given - (straight - spatial_terms(values, q, 0.0 * q).lengths)
-        at_spool = held.given if held.stiffness is None else held.stiffness * stretch.clip(0.0)
         wrapped = np.hypot(q[:, ::2], q[:, 1::2]) @ spanned.T
-        left = np.exp(-held.friction[:, None] * (held.sheath[:, None] + wrapped) * z)
-        r: Array = spatial_linearised(values, q, 0.0 * q, 0.0 * q, at_spool * left)[0]
-        return r
+        pulls = held.pulls(straight - spatial_terms(values, q, still).lengths, wrapped, z)
+        return spatial_linearised(values, q, still, still, pulls)[0]
 
-    return _newton(residual, guess)
-
-
-def _newton(residual: Callable[[Array], Array], guess: Array) -> Array:
-    """Zeros (B, m) of functions of B points at once, from a guess (B, m)."""
-    x, steps = np.array(guess, float), _SMALL * np.eye(guess.shape[1])
-    for _ in range(_STEPS):
-        r = residual(x)
-        columns = [(residual(x + step) - residual(x - step)) / (2.0 * _SMALL) for step in steps]
-        change = np.linalg.solve(np.stack(columns, axis=2), -r[..., None])[..., 0]
-        largest = np.abs(change).max(axis=1, initial=1e-300)
-        x = x + change * np.minimum(1.0, _STRIDE / largest)[:, None]
-        if largest.max() < 1e-12:
-            break
-    if not np.abs(residual(x)).max() < _AT_REST:
-        fix = "less friction, sheath or bend, or more pull"
-        raise UserError("no rest was found on held tendons in two planes", "wrist", fix)
-    return x
-
-
-def spatial_energy(parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike) -> Array:
-    """Energy (...) [J] of motion, springs, gravity, the tip force and held pulls (T,) [N]; damping alone takes from it.
-
-    At coordinates and rates (..., 2n); gravity's and the force's are counted from the base.
-    """
-    values = np.asarray(parameters, float)
-    segment = SpatialSegments(*values[:FIELDS])
-    q, rate = np.broadcast_arrays(np.asarray(q, float), np.asarray(rate, float))
-    at = spatial_terms(values, q, rate)
-    moving = 0.5 * np.einsum("...i,...ij,...j->...", rate, at.mass, rate)
-    stiffness = np.array([[segment.stiffness_yy, segment.stiffness_yz], [segment.stiffness_yz, segment.stiffness_zz]])
-    bends = q.reshape(*q.shape[:-1], -1, 2)
-    springs = 0.5 * np.einsum("...ka,ab,...kb->...", bends, stiffness, bends)
-    gravity = np.array([segment.gravity_x, segment.gravity_y, segment.gravity_z])
-    ends = _ends(values, q)
-    middles = 0.5 * (ends[..., 1:, :] + ends[..., :-1, :])
-    hand = at.tip + segment.hand_offset * at.frame[..., 0]
-    weight = -(segment.mass * middles.sum(axis=-2) + segment.hand_mass * hand) @ gravity
-    load = -at.tip @ np.array([segment.force_x, segment.force_y, segment.force_z])
-    energy: Array = moving + springs + weight + load + at.lengths @ np.asarray(pulls, float)
-    return energy
-
-
-def _ends(values: Array, q: Array) -> Array:
-    """Ends of the segments from the base, (..., n + 1, 3) [m]: tips of the wrists cut off there."""
-    ends = [np.zeros((*q.shape[:-1], 3))]
-    for k in range(1, q.shape[-1] // 2):
-        bent = q.copy()
-        bent[..., 2 * k :] = 0.0
-        at = spatial_terms(values, bent, 0.0 * bent)
-        rest = (q.shape[-1] // 2 - k) * values[SpatialSegments._fields.index("length")]
-        ends.append(at.tip - rest * at.frame[..., 0])
-    return np.stack([*ends, spatial_terms(values, q, 0.0 * q).tip], axis=-2)
+    return at_rest_where(residual, guess)

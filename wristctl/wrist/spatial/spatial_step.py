@@ -1,19 +1,19 @@
 """One step of RODAS3 (`wristctl.wrist.integrator`) on the wrist in two planes, with the exact Jacobian.
 
 The step's `spool_input` holds a row for each tendon: pulls or reeled lengths, by the type of `tendons`
-(`wristctl.wrist.spatial.spooled_tendons`).
+(`wristctl.wrist.tendon_mechanics`).
 """
 
 from typing import Any
 
-import wristctl.wrist.spatial.spatial_resistance  # noqa: F401 what stops and friction of places give to the residual
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import sqrt
 from wristctl.lanes.rows import lanes_like
-from wristctl.wrist.integrator import Held, accelerate, factorise, rodas3, solve, yield_, yield_jacobians
+from wristctl.wrist.integrator import Held, accelerate, factorise, rodas3, solve
 from wristctl.wrist.plant import path_along, path_before
 from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, spatial_bias, spatial_equation
 from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
+from wristctl.wrist.spatial.spatial_resistance import yield_in_space, yield_jacobians_in_space
 from wristctl.wrist.spatial.spooled_tendons import stiffen_by_tendons
 from wristctl.wrist.tendon_mechanics import acting_pulls, pull_along
 
@@ -25,7 +25,7 @@ def _accelerations(held: Any, q: Any, rate: Any, mass: Any, a: Any) -> None:
     for t in range(len(pulls)):
         pulls[t] = pull_along(tendons, held.spool_input, t, path)
     spatial_equation(held.plant, q, rate, pulls, mass, a)
-    yield_(tendons, held.plant, q, rate, held.spool_input, a)
+    yield_in_space(tendons, held.plant, q, rate, held.spool_input, a)
     factorise(mass)
     solve(mass, a)
 
@@ -37,11 +37,11 @@ def _linearised(held: Any, q: Any, rate: Any, linear: Any) -> None:
     acting_pulls(tendons, held.spool_input, path, pulls)
     bent = bent_wrist(wrist, q, pulls, linear.mass)
     spatial_bias(wrist.segment, q, rate, bent.posture, bent.tangent, bent.torques.torque, linear.acceleration)
-    yield_(tendons, wrist, q, rate, held.spool_input, linear.acceleration)
+    yield_in_space(tendons, wrist, q, rate, held.spool_input, linear.acceleration)
     accelerate(linear.mass, linear.factors, linear.acceleration)
     spatial_jacobians(wrist.segment, q, rate, linear.acceleration, bent, linear.by_q, linear.by_rate)
     stiffen_by_tendons(tendons, wrist, q, rate, held.spool_input, path, linear.by_q)
-    yield_jacobians(tendons, q, rate, linear.by_q, linear.by_rate)
+    yield_jacobians_in_space(tendons, q, rate, linear.by_q, linear.by_rate)
 
 
 @compiled

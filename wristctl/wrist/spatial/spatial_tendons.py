@@ -51,19 +51,16 @@ def share_of(tendons: Any, t: int, k: int) -> Any:
 @by_type
 def lengths_along(wrist: Any, q: Any, lengths: Any) -> None:
     """Length of each tendon from the base to where it ends [m]; T rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def moment_arms_of(wrist: Any, q: Any, t: int, arms: Any) -> None:
     """Moment arms of a tendon, minus the derivatives of its length by each coordinate [m]; 2n rows."""
-    raise NotImplementedError("compiled code only")
 
 
 @by_type
 def tendons_torques(wrist: Any, q: Any, pulls: Any, torques: Any) -> None:
     """Torque of the tendons' pulls [N] (T rows) on each coordinate with its derivatives, into TendonTorques."""
-    raise NotImplementedError("compiled code only")
 
 
 @compiled
