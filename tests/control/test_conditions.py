@@ -129,7 +129,7 @@ def test_real_motors_do_not_move_by_gains_that_may_swing_unless_told_to(capsys: 
         with pytest.raises(UserError, match="not made for elastic tendons behind a camera") as refused:
             hw_run(Session(study, Inputs(), Findings(study.seed, None), watched(None), operator))
         assert refused.value.exit_code == 3
-    TerminalOperator(Terminal(stderr=True), True, frozenset({"force"})).dare("it may swing")
+    TerminalOperator(Terminal(stderr=True), True, frozenset({"force"})).dare("it may swing", "a", "b")
     assert "it may swing" in capsys.readouterr().err
 
 

@@ -147,9 +147,47 @@ def test_another_limit_kept_does_not_forgive_one_that_is_not() -> None:
 
 def test_a_jump_between_two_frames_stops_at_once() -> None:
     said, late = stopped(theta=after(math.radians(2.2)))
-    assert "jumps by 2.2 deg from one frame to the next" in said and late <= FRAME * PERIOD
+    assert "jumps by 2.2 deg off its motors" in said and late <= FRAME * PERIOD
     assert "likely the tip's marker has slipped" in said
     watched(theta=after(math.radians(1.9)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_wrist_that_is_held_jumps_off_its_motors_over_two_frames_and_a_slow_drift_does_not(sign: float) -> None:
+    """Frames are 15 ms apart; either way it comes off by 3 deg, which the other limit lets pass."""
+
+    def drifting(over_two: float) -> Course:
+        rate = math.radians(over_two) / (2.0 * FRAME * PERIOD)
+        return lambda time: sign * min(math.radians(3.0), rate * max(0.0, time - 0.5))
+
+    said, late = stopped(theta=drifting(2.3))
+    assert "jumps by 2." in said and "off its motors" in said and late <= 4 * FRAME * PERIOD
+    watched(theta=drifting(1.8))
+
+
+def test_a_jump_between_frames_of_a_slow_camera_is_one_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "FRAME", 10)
+    said, _ = stopped(theta=after(math.radians(2.2)))
+    assert "jumps by 2.2 deg off its motors" in said
+
+
+@pytest.mark.parametrize(("off", "beyond"), [((1.6, -1.6), True), ((1.3, 1.3), False), ((0.0, 2.1), True)])
+def test_jumps_before_two_cameras_count_together_though_each_looks_at_another_time(
+    off: tuple[float, float], beyond: bool
+) -> None:
+    watch, held = Watch(settings_of(planes=2), WRIST, "", TickTiming(PERIOD)), np.full(4, 1e-4)
+    for tick in range(140):
+        time, camera = tick * PERIOD, tick % 2
+        bend = math.radians(off[camera]) if time >= 0.5 else 0.0
+        verdict, corners = SightingVerdict.OK, np.zeros((2, 4, 2))
+        watch.saw(Sighting(time, tick, bend, verdict, corners, 0.9, stands=1.0, grey=1.0, plane=camera), time, time)
+        estimate = Estimate(np.zeros(2), np.zeros(2), np.zeros(2))
+        now = Tick(time, 0.0, estimate, np.zeros(4), np.zeros(4), State.ENABLED, 0, 0)
+        values = watch.see(now, time)
+        watch.predict(held)
+        if values["jump"] > math.radians(2.0):
+            break
+    assert (time < 0.53) == beyond and (not beyond or values["jump"] == pytest.approx(math.radians(math.hypot(*off))))
 
 
 @pytest.mark.parametrize(("frequency", "until", "swings"), [(2.0, 3.0, True), (0.8, 3.0, False), (2.0, 0.9, False)])

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import FrozenInstanceError
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -211,6 +211,54 @@ def test_a_tendon_that_is_still_taut_where_all_are_slackened_is_found(short: int
         return
     with pytest.raises(SafetyStop, match=r"a slackened wrist still moved by .* when it was slackened further"):
         HomedWrist(board, tracking, settings, WRIST, "ulnar", zero).check_zero()
+
+
+def checked(plane: str, axis: int, true_steps: Callable[[float], float]) -> None:
+    """Check the zero of a wrist of which one axis makes `true_steps` where it was told so many."""
+    board: Any = Slackened()
+    signs, sides = (1, -1, 1, -1), np.where(on_plus_side(plane), 1.0, -1.0)
+    settings = settings_of(homing={"frames": 1, "rest": 0.0})
+    per_radian = ExpectedMoves(settings, WRIST, plane).steps()
+
+    def angle() -> float:
+        reeled = np.array(signs) * board.position
+        reeled[axis] = true_steps(reeled[axis])
+        return GLUED + float((sides * np.maximum(0.0, reeled)).sum() / per_radian)
+
+    zero, tracking = Zero(signs, (per_radian,) * 4, (GLUED,), (0.0,) * 4), Marker(board, angle)
+    slacken(board, SPOOLS, settings.homing, signs)
+    HomedWrist(board, cast(Any, tracking), settings, WRIST, plane, zero).check_zero()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    axis=st.integers(0, 3), plane=st.sampled_from(["ulnar", "flexion"]), scale=st.sampled_from([0.5, 1.9, 2.0]),
+    stood=st.floats(-150.0, 150.0),
+)  # fmt: skip
+def test_a_drive_that_falls_to_other_microsteps_is_found_wherever_its_spool_stood_then(
+    axis: int, plane: str, scale: float, stood: float
+) -> None:
+    """Its zero is then off by (1 - scale) times as much, which at one place makes a bend as large as it should be."""
+    with pytest.raises(SafetyStop):
+        checked(plane, axis, lambda told: stood + scale * (told - stood))
+
+
+def test_wrong_steps_whose_bend_is_as_large_as_it_should_be_are_told_by_what_it_grows_by() -> None:
+    reeled = round(1.2 * Homing().pull / SPOOLS.step)
+    with pytest.raises(SafetyStop, match=r"axis 2 \(tendon 4\) takes \d+ steps for one radian, 0.50 times") as stopped:
+        checked("ulnar", 2, lambda told: reeled + 2.0 * (told - reeled))
+    assert "microsteps" in stopped.value.what
+
+
+@pytest.mark.parametrize(("lost", "found"), [(0.0, False), (0.15, False), (-0.15, False), (0.31, True), (-0.31, True)])
+def test_steps_that_were_lost_are_found_from_a_third_of_a_millimetre_on(lost: float, found: bool) -> None:
+    off = 1e-3 * lost / SPOOLS.step
+    for axis in range(4):
+        if found:
+            with pytest.raises(SafetyStop):
+                checked("flexion", axis, lambda told: told - off)
+        else:
+            checked("flexion", axis, lambda told: told - off)
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])

@@ -10,9 +10,18 @@ import pytest
 
 import wristctl
 from tests.trial.conftest import WRIST, Run, settings_of
+from wristctl.cli.operator import TerminalOperator
+from wristctl.cli.progress import Terminal
+from wristctl.commands.hw_run.command import hw_run
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.progress import watched
+from wristctl.commands.results import Findings
+from wristctl.commands.session import Session
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
-from wristctl.trial.motion_limit import LEAST, limited, peak_tension
+from wristctl.trial.motion_limit import LEAST, held_pull, limited, peak_tension, reeled_unseen, unseen_time
 from wristctl.trial.trial_results import twin
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.trial.zero_checks import _goes_on
@@ -69,6 +78,66 @@ def test_a_limit_is_so_many_times_what_trials_need_and_never_above_what_tendons_
     assert changed.hw_run.safety.model_copy(update={"tension": 60.0}) == study.hw_run.safety.model_copy(
         update={"tension": 60.0}
     )
+
+
+@pytest.mark.parametrize("turn", [1.5, 4.0])
+@pytest.mark.parametrize(("rate", "delay_frames", "unseen"), [(60.0, 2.0, 0.062), (30.0, 1.0, 0.0787)])
+def test_what_a_spool_reels_in_unseen_is_the_way_of_the_motion_in_that_time(
+    turn: float, rate: float, delay_frames: float, unseen: float
+) -> None:
+    """Of a dart-thrower through angle A at 5 deg off a pair of tendons: 2 r A cos 5 sin(pi t/turn), and the ramp's."""
+    path = {"kind": "dart-thrower", "angle_deg": 30.0, "turn": turn}
+    settings = HwRunSettings.model_validate(
+        {"planes": 2, "reference": path, "horizon": 1.5 * turn,
+         "sensor": {"frame_rate": rate, "delay_frames": delay_frames}}
+    )  # fmt: skip
+    assert unseen_time(settings) == pytest.approx(unseen, abs=1e-4)
+    motors, largest = settings.actuator, WRIST.tendon_radius * math.radians(30.0) * math.cos(math.radians(5.0))
+    ticks = math.ceil(unseen / settings.control_period) * settings.control_period
+    fastest = 2.0 * math.pi / turn * largest
+    way = 2.0 * largest * math.sin(math.pi * ticks / turn) + fastest**2 / (2.0 * motors.ramp * motors.step_length)
+    assert reeled_unseen(settings, WRIST) == pytest.approx(way, rel=0.02)
+
+
+def test_a_slower_motion_a_lower_current_or_a_lower_limit_lets_a_held_wrist_be_pulled_less() -> None:
+    settings = HwRunSettings.model_validate({"safety": {"motor_pull": 100.0, "tension": 35.0}})
+    assert held_pull(settings, 2.5e-3) == pytest.approx(35.0 + 20e3 * 2.5e-3)
+    assert held_pull(settings, 1.0e-3) == pytest.approx(55.0)
+    weak, strict = (
+        settings.model_copy(update={"safety": settings.safety.model_copy(update=each)})
+        for each in ({"motor_pull": 42.0}, {"tension": 18.0})
+    )
+    assert held_pull(weak, 2.5e-3) == 42.0 and held_pull(strict, 1.0e-3) == pytest.approx(38.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pull"),
+    [((), 100), (("hw-run.reference.turn=5", "hw-run.horizon=6"), None), (("hw-run.safety.motor_pull=42",), 42)],
+)  # fmt: skip
+def test_motors_that_may_pull_more_than_tendons_bear_do_not_move_real_ones_unless_told_to(
+    changes: tuple[str, ...], pull: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is said before the port is opened."""
+    begun: list[str] = []
+    monkeypatch.setattr("wristctl.commands.hw_run.trials.perform_trials", lambda *given: _begin(begun))
+    thrown = "hw-run={planes: 2, reference: {kind: dart-thrower, turn: 1.5}, push: {force: 0}, horizon: 2.0}"
+    study = wristctl.load_study(None, thrown, "hw-run.safety.motor_pull=100", "hw-run.port=/nowhere", *changes)
+    for flags in ({"yes"}, {"yes", "force"}):
+        operator = TerminalOperator(Terminal(stderr=True), True, frozenset(flags))
+        with pytest.raises(UserError) as stopped:
+            hw_run(Session(study, Inputs(), Findings(study.seed, None), watched(None), operator))
+        said = " ".join(capsys.readouterr().err.split())
+        if changes or "force" in flags:
+            assert begun.pop() == "begun" and ("beyond the 60 N that tendons are to bear" in said) == (not changes)
+            assert f"may pull a tendon with {pull or ''}" in said
+        else:
+            assert not begun and stopped.value.exit_code == 3 and "60 % of their current" in str(stopped.value.fix)
+            assert "may pull a tendon with 100 N, beyond the 60 N" in stopped.value.what
+
+
+def _begin(begun: list[str]) -> None:
+    begun.append("begun")
+    raise UserError("so far")
 
 
 @pytest.mark.parametrize("taken", [0.25, 0.5])

@@ -75,10 +75,10 @@ class TerminalOperator:
             if typed_line(meanwhile or idle) != "yes":
                 raise UserError("nothing was moved further", fix="type yes, or --yes for scripted use", exit_code=3)
 
-    def dare(self, danger: str) -> None:
+    def dare(self, danger: str, where: str, fix: str) -> None:
         """Only with the flag `force`."""
         if "force" not in self.flags:
-            raise UserError(danger, "hw-run.controllers", "other gains, or go on with --force", exit_code=3)
+            raise UserError(danger, where, f"{fix}, or go on with --force", exit_code=3)
         self.tell(danger)
 
     def wait_for(self, request: str) -> None:

@@ -52,8 +52,8 @@ class Operator(Protocol):
         Until then `meanwhile` is called again and again: what it raises ends the question.
         """
 
-    def dare(self, action: str) -> None:
-        """Allow an action that is unsafe on hardware. Raises UserError unless the operator has forced it."""
+    def dare(self, danger: str, where: str, fix: str) -> None:
+        """Allow what is unsafe on hardware by this setting. Raises UserError unless the operator has forced it."""
 
     def wait_for(self, action: str) -> None:
         """Ask the operator for `action`, and return once it is done."""
@@ -110,7 +110,13 @@ class Unattended:
         """Raises UserError."""
         raise UserError(f"nobody is there to agree to this: {action}", fix="use the command line", exit_code=3)
 
-    dare = wait_for = confirm
+    def dare(self, danger: str, where: str, fix: str) -> None:
+        """Raises UserError."""
+        self.confirm(danger)
+
+    def wait_for(self, action: str) -> None:
+        """Raises UserError."""
+        self.confirm(action)
 
     @contextmanager
     def watch(self, trials: Sequence[Trial], session: Session) -> Iterator[Shown]:

@@ -73,7 +73,7 @@ class Safety(Section):
         3.5, "deg", "furthest that the marker may be from where the spools should have the wrist", "measured", gt=0
     )
     jump_deg: float = quantity(
-        2.0, "deg", "furthest that it may come off that from a frame to the next", "measured", gt=0
+        2.0, "deg", "furthest that it may come off that within 40 ms, or from a frame to the next", "measured", gt=0
     )
     excess_pull: float = quantity(
         10.0, "N", "furthest that a tendon's load cell may show more than its spool explains", "measured", gt=0

@@ -273,8 +273,7 @@ class ExpectedMoves:
 
     def pulls_differently(self, axis: int) -> SafetyStop:
         """The stop of a tendon without a line."""
-        problem = f"tendon {self._numbers[axis]} pulls differently each time"
-        return SafetyStop(problem, "homing", "see whether it slips")
+        return SafetyStop(f"tendon {self._numbers[axis]} pulls differently each time", "homing", "see whether it slips")
 
     def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
         """Direction [rad] in which bends grow with what an axis has reeled in, nan before one camera.
@@ -306,9 +305,15 @@ class ExpectedMoves:
 
     def judge_steps(self, axis: int, steps: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where steps per radian are not those of the model, as `has_steps`."""
-        if self.has_steps(axis, steps, stays):
-            return
-        meant = self.steps(axis=axis)
+        if not self.has_steps(axis, steps, stays):
+            raise self._wrong_steps(axis, steps, self.steps(axis=axis))
+
+    def judge_growth(self, axis: int, steps: float, stiffness: float) -> None:
+        """Raises SafetyStop where a bend grows by steps nearer to half or twice the model's of this stiffness [N/m]."""
+        if not 0.5 < (steps / (meant := self.steps(stiffness, axis=axis))) ** 2 < 2.0:
+            raise self._wrong_steps(axis, steps, meant)
+
+    def _wrong_steps(self, axis: int, steps: float, meant: float) -> SafetyStop:
         ratio, unit = steps / meant, self._spools.step
         taken = f"{1e3 * steps * unit:.3g} mm of tendon" if self.own else f"{steps:.0f} steps"
         model = f"{1e3 * meant * unit:.3g} mm" if self.own else f"{meant:.0f}"
@@ -317,7 +322,7 @@ class ExpectedMoves:
             f"{words.motors[axis]} takes {taken} for one radian, {ratio:.2f} times what the model says ({model}); "
             f"likely {words.scale}, or {slips if ratio > 1.0 else words.loose}"
         )
-        raise SafetyStop(problem, "homing", words.rescale)
+        return SafetyStop(problem, "homing", words.rescale)
 
     def judge_slack(self, axis: int, slack: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where a tendon was taut before anything was reeled in.

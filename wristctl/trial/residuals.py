@@ -125,10 +125,10 @@ RESIDUALS: Mapping[str, Residual] = {
         _COUNT, "1 where the board is not ENABLED", lambda s: 0.0, math.inf, "home again", "the board is not ENABLED"
     ),
     "jump": Residual(
-        _DEG, "marker against where spools should have it, change between two frames",
+        _DEG, "marker against where spools should have it, change within 40 ms or from a frame to the next",
         lambda s: math.radians(s.safety.jump_deg), 0.5, "the tip's marker has slipped; pictures shown or dated wrongly",
-        "the marker's angle jumps by {value} from one frame to the next, beyond {limit}",
-        "{value} of jump between frames (limit {limit})",
+        "the marker's angle jumps by {value} off its motors, beyond {limit}",
+        "{value} of jump off its motors (limit {limit})",
     ),
     "doubted": Residual(
         _SHARE, "share of a second's pictures that tell no bend across", lambda s: 0.9, 0.3,
@@ -202,10 +202,10 @@ _OF_A_RIG: Mapping[str, Mapping[str, str]] = {
     "pull": {"meaning": "largest tension by where the motors are and the estimated bend"},
     "travel": {"meaning": "target furthest from zero", "stops": "a target {value} from zero, beyond {limit}"},
     "jump": {
-        "meaning": "bend against where targets should have it, change between two looks",
+        "meaning": "bend against where targets should have it, change within 40 ms or from a look to the next",
         "causes": "the sensor has slipped; bends dated wrongly",
-        "stops": "the bend jumps by {value} from one look to the next, beyond {limit}",
-        "notes": "{value} of jump between looks (limit {limit})",
+        "stops": "the bend jumps by {value} off its targets, beyond {limit}",
+        "notes": "{value} of jump off its targets (limit {limit})",
     },
     "load": {"causes": _TARGETS},
     "apart": {"meaning": "bend against where targets should have it", "causes": _TARGETS},

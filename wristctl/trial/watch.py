@@ -34,6 +34,8 @@ _HISTORY, _SWINGING = 0.2, 1.0
 _TICKS, _EVENTS, _SEEN = 0.5, 1.0, 2.0
 # Periods after which spools' steps that were counted are old: those of the tick before are one.
 _UNHEARD = 2.5
+# Seconds over which a marker's jump is seen: two pictures of 60 a second, and always one.
+_JUMPED = 0.04
 # Share of the limit on a bend across by which what stands may seem to bend.
 _DOUBTFUL = 0.5
 _FOLLOWING = "jump", "across", "load", "apart"
@@ -219,11 +221,16 @@ class Watch:
         self._positions.append(tick.position)
         while tick.clock - self._past[0].clock > _HISTORY:
             self._past.popleft()
-        jumps = [0.0]
-        if len(self._past) > 1:
-            jumps = [jump_between(*both) for both in zip(self._past[-2].frames, frames, strict=True)]
+        jumps = [jump_between(self._before(k), frame) for k, frame in enumerate(frames)]
         across = frames[0].away if len(frames) == 1 else math.nan
         return {"jump": _size(jumps), "across": across, "load": load, "apart": _size([each.apart for each in frames])}
+
+    def _before(self, camera: int) -> Frame:
+        """The frame of a camera that its newest one is compared with; without one before it that one itself."""
+        frames = [past.frames[camera] for past in self._past]
+        earlier = [frame for frame in frames if frame.captured < frames[-1].captured]
+        near = [frame for frame in earlier if frames[-1].captured - frame.captured <= _JUMPED]
+        return (near or earlier[-1:] or frames[-1:])[0]
 
     def _of_timing(self, clock: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))

@@ -17,8 +17,9 @@ from wristctl.trial.supervised_wait import Motors, Patience, Reading
 from wristctl.trial.tracking import Tracking
 from wristctl.wrist.tendon_layout import TendonLayout
 
-# Share of `homing.pull` by which a tendon is reeled in to check it.
-_CHECKED = 1.2
+# Share of `homing.pull` by which a tendon is reeled in to check it, and times that by which it is then: what bends the
+# wrist further by so little is still no other tendon's hold, since those are let out by `homing.pull` twice.
+_CHECKED, _ON = 1.2, 1.5
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
 # Shares of the bend at which tendons let out by `homing.pull` hold a wrist that sags: from which on they may, and by
@@ -26,6 +27,8 @@ _SETTLES = 0.5
 _HELD, _FURTHER = 0.6, 0.5
 # Share of a bend that is left where tendons have brought a wrist back.
 _BACK = 0.5
+# Growth of a bend [rad] that counts as none.
+_LEAST_GROWN = 1e-6
 
 
 class HomedWrist:
@@ -148,34 +151,38 @@ class HomedWrist:
 
         Friction inside a wrist leaves it bent where it was let go, and turns a bend by another tendon aside. So
         opposite tendons bend it in turn, each from where the other has left it, and straight is the middle of where it
-        rests.
+        rests. One bend tells no wrong steps from a wrong zero, which may cancel each other: what it grows by does.
         """
         expected, reeled = self._expected, round(_CHECKED * self._homing.pull / self._spools.step)
         against = pair[1] if len(pair) > 1 else expected.against(pair[0])
-        bend, rest = self._bent(against, 2 * reeled, rest)
+        (bend,), rest = self._bent(against, (2 * reeled,), rest)
         meant = reeled / expected.steps(self._stiffness, axis=against)
         if expected.size(bend) < LEAST * meant:
             raise expected.bends_too_little(against, bend, meant)
-        rests, bends = [_bend_of(rest)], []
+        rests, bends, further = [_bend_of(rest)], [], round(_ON * reeled)
         for axis in pair:
-            bend, rest = self._bent(axis, reeled, rest)
-            bends.append(bend)
+            both, rest = self._bent(axis, (reeled, further), rest)
+            bends.append(both)
             rests.append(_bend_of(rest))
         straight = middle(rests[1:])
-        for axis, before, bend in zip(pair, rests, bends, strict=False):
+        for axis, before, (bend, on) in zip(pair, rests, bends, strict=False):
             away = expected.along(axis, straight.since(before)) * expected.steps(self._stiffness, axis=axis)
             expected.judge_small_move(axis, reeled + away, bend, self._stiffness)
+            grown = max(_LEAST_GROWN, expected.along(axis, on.since(bend)))
+            expected.judge_growth(axis, (further - reeled) / grown, self._stiffness)
         return straight, rest
 
-    def _bent(self, axis: int, by: int, rest: Reading) -> tuple[Bend, Reading]:
-        """The bend that an axis makes of the wrist at rest, and where that rests after it."""
-        positions = np.full(len(self._zero.signs), -2 * self._slack)
-        positions[axis] = by
-        patience = self._reeled(positions)
-        patience.wait(2.0 * self._homing.rest)
-        bend = self._expected.bend(rest, patience.reading(self._tracking, self._homing.frames))
+    def _bent(self, axis: int, positions: Sequence[int], rest: Reading) -> tuple[list[Bend], Reading]:
+        """The bends that an axis makes of the wrist at rest at these positions, and where that rests after them."""
+        bends = []
+        for reeled in positions:
+            every = np.full(len(self._zero.signs), -2 * self._slack)
+            every[axis] = reeled
+            patience = self._reeled(every)
+            patience.wait(2.0 * self._homing.rest)
+            bends.append(self._expected.bend(rest, patience.reading(self._tracking, self._homing.frames)))
         self.slacken(2.0)
-        return bend, self._rest()
+        return bends, self._rest()
 
     def _reeled(self, positions: NDArray[np.int64]) -> Patience:
         """Reel all tendons in by so many microsteps (T,); who waits while they stand."""

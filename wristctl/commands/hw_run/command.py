@@ -126,7 +126,7 @@ def hw_run(session: Session) -> Performed:
     else:
         warn_of_earlier_families(believed.rows)
         if swinging := outside_conditions(believed.rows, [believed.loop]):
-            session.operator.dare("; ".join(swinging))
+            session.operator.dare("; ".join(swinging), "hw-run.controllers", "other gains")
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
@@ -138,7 +138,7 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     """The session with tension limited to what the trials need, as the person is told."""
     import numpy as np
 
-    from wristctl.trial.motion_limit import limited, peak_tension
+    from wristctl.trial.motion_limit import held_pull, limited, peak_tension, reeled_unseen
     from wristctl.trial.trials import trials_of
 
     study = session.study
@@ -158,6 +158,20 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
             f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): no simulation says what a live "
             "reference needs"
         )
+        return replace(session, study=changed)
+    reeled = reeled_unseen(changed.hw_run, study.wrist, network)
+    pull, borne = held_pull(changed.hw_run, reeled), study.hw_run.within(study.wrist).safety.tension
+    beyond = f", beyond the {borne:.0f} N that tendons are to bear (safety.tension)" if pull > borne else ""
+    said = (
+        f"a wrist that is held, or a motor that fails, may pull a tendon with {pull:.0f} N{beyond}: spools reel in "
+        f"{1e3 * reeled:.1f} mm more until that is seen and they stand"
+    )
+    if beyond and study.hw_run.port is not None:
+        share = 100.0 * borne / study.hw_run.safety.motor_pull
+        fix = f"a slower motion, or drives at {share:.0f} % of their current (safety.motor_pull={borne:.0f})"
+        session.operator.dare(said, "hw-run.safety.motor_pull", fix)
+    else:
+        session.operator.tell(said)
     return replace(session, study=changed)
 
 
