@@ -10,7 +10,7 @@ from wristctl.commands.adoption import adoption, sources_in
 from wristctl.commands.session import Session
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
-from wristctl.work.worker import UNITS, Computed, Furnish, Golden, Unit, code_digest
+from wristctl.work.worker import UNITS, Computed, Furnish, Golden, Unit
 
 log = logging.getLogger(__name__)
 
@@ -30,6 +30,8 @@ def performed(
     All workers must reproduce the `golden` numbers. The hashes of laws from elsewhere are part of the units'
     specifications. What the units' sizes are of is `counted`; `then` and `after` are those of `Session.progress`.
     """
+    from wristctl.work.worker import code_digest
+
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
     folder, earlier = (source.path / UNITS if source else None for source in (run, stopped))
     first = folder is None or not folder.exists()
