@@ -192,7 +192,7 @@ def _settings(current: str, motion: str) -> HwRunSettings:
 
 
 def told(current: str, motion: str, limit: float) -> float:
-    """What `hw-run` says before a motor turns that a held wrist may be pulled with [N], of a limit of tension [N]."""
+    """What `hw-run` tells before a motor turns that a held wrist may be pulled with [N], of a limit of tension [N]."""
     settings = _settings(current, motion)
     safety = settings.safety.model_copy(update={"tension": limit})
     return held_pull(settings.model_copy(update={"safety": safety}), _reeled(motion))
@@ -225,16 +225,17 @@ def page(table: Table, loads: Loads) -> str:
     columns = list(itertools.product(CURRENTS, TRIED))
     through, left = sum(ended.outcome == "ok" for ended in table.values()), len(CASES) * len(columns) - len(table)
     over_all, stopped = medians(table, "1.0 A")
+    above = max((ended.pull - told(*at, ended.limit) for (_, *at), ended in table.items()), default=0.0)
     more = f"; {left} more trials are to be made" if left else ""
-    told = f"""
+    head = f"""
         {len(table)} trials on the emulated rig, without load cells: in {len(beyond(table))} of them a tendon truly
         pulled more than {MOST:g} N. Drives at 1.0 A hold 43 N, at 2.4 A 101 N, and `safety.motor_pull=100` says so. The
         median of the largest pulls at 1.0 A is {over_all:.0f} N; of the trials that were stopped in the motion it is
         {stopped:.0f} N. What bounds them is that a trial ends beyond
         [twice the tension that its simulation needs](rig.md#motor-current), and how far spools go on until a camera has
-        shown that a wrist is held. `hw-run` says the sum before a motor turns; a motion and a current of which it is
-        more than 60 N it refuses on real motors. A blow, and tendons that tighten together, are faster or bend nothing:
-        those are for [load cells](load-cells.md).
+        shown that a wrist is held. `hw-run` tells the sum before a motor turns; a motion and a current of which it is
+        more than 60 N it refuses on a board. No tendon pulled by more than {above:.0f} N beyond what was told. A blow,
+        and tendons that tighten together, are faster or bend nothing: those are for [load cells](load-cells.md).
         Made by `make largest-pulls`{more}.
     """
     legend = f"""
@@ -244,7 +245,7 @@ def page(table: Table, loads: Loads) -> str:
     """
     lines = [
         "# How hard a tendon pulls when a motor fails or a hand holds the wrist", "",
-        folded(told), "",
+        folded(head), "",
         "| current | motion | limit of tension [N] | told before [N] | largest true pull [N] | median [N] | beyond "
         f"{MOST:g} N | of |", "|---|---|---|---|---|---|---|---|",
         *(_summed(table, current, motion) for current, motion in columns),

@@ -21,6 +21,8 @@ from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
 
+# Seconds of a run that is refused before its trial that are looked at.
+_LAST = 0.1
 _UNPUSHED: dict[str, Any] = {"push": {"force": 0.0}, "bench": {"person": {"takes": 0.0}}}
 
 
@@ -62,7 +64,8 @@ def performed(
     finally:
         log.close()
     stopped = bench.transport.now()
-    begun = min(stopped, bench.faults._starts["first trial"])
+    started = bench.faults._starts["first trial"]
+    begun = started if started < stopped else stopped - _LAST
     truth, followed = bench.truth(begun), next(iter(done.motions.values()))
     time = truth.time - begun
     moving = time < followed.horizon if done.stop is None or done.stop.time is None else time < done.stop.time

@@ -163,8 +163,8 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     pull, borne = held_pull(changed.hw_run, reeled), study.hw_run.within(study.wrist).safety.tension
     beyond = f", beyond the {borne:.0f} N that tendons are to bear (safety.tension)" if pull > borne else ""
     said = (
-        f"a wrist that is held, or a motor that fails, may pull a tendon with {pull:.0f} N{beyond}: spools reel in "
-        f"{1e3 * reeled:.1f} mm more until that is seen and they stand"
+        f"a wrist that is held, or a motor that fails, may pull a tendon with about {pull:.0f} N{beyond}: "
+        f"spools reel in {1e3 * reeled:.1f} mm more until that is seen and they stand"
     )
     if beyond and study.hw_run.port is not None:
         share = 100.0 * borne / study.hw_run.safety.motor_pull
