@@ -41,8 +41,36 @@ class LoopCase(NamedTuple):
     high: float
 
 
+class Driven:
+    """A wrist that was driven to where it began: energies of its course."""
+
+    course: Spooled
+
+    @property
+    def friction_work(self) -> float:
+        """Energy that friction took [J]."""
+        return float(self.course.friction[-1] - self.course.friction[0])
+
+    @property
+    def raw_work(self) -> float:
+        """Energy that the spools gave: area of the loop of pulls at the spools over the tendons' path [J]."""
+        return float(self.course.raw[-1] - self.course.raw[0])
+
+    @property
+    def damped_work(self) -> float:
+        """Energy that the wrist's damping took [J]."""
+        return float(self.course.damped[-1] - self.course.damped[0])
+
+    def changes_of_works(self, coarse: Driven) -> list[float]:
+        """Relative change of each from a longer step to this one."""
+        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
+        names = "friction_work", "raw_work", "damped_work"
+        pairs = [(getattr(self, name), getattr(coarse, name)) for name in names]
+        return [abs(fine - before) / max(abs(fine), least) for fine, before in pairs]
+
+
 @dataclass(frozen=True)
-class HysteresisLoop:
+class HysteresisLoop(Driven):
     """The last of one and a half cycles, from the range's high end back to it; its last sample is the first again."""
 
     case: LoopCase
@@ -81,33 +109,10 @@ class HysteresisLoop:
         quarter = (len(self.time) - 1) // 4
         return float(self.bend[quarter] - self.bend[3 * quarter])
 
-    @property
-    def friction_work(self) -> float:
-        """Energy that friction took [J]."""
-        return gained(self.course.friction)
-
-    @property
-    def raw_work(self) -> float:
-        """Area of the loop of pulls at the spools over the tendons' path [J]."""
-        return gained(self.course.raw)
-
-    @property
-    def damped_work(self) -> float:
-        """Energy that the wrist's damping took [J]."""
-        return gained(self.course.damped)
-
     def change(self, coarse: HysteresisLoop) -> float:
         """Largest relative change of width and works from a longer step to this one."""
         of_width = abs(self.width - coarse.width) / max(abs(self.width), _LEAST_WIDTH)
-        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
-        names = "friction_work", "raw_work", "damped_work"
-        pairs = [(getattr(self, name), getattr(coarse, name)) for name in names]
-        return largest_change([of_width, *(abs(fine - before) / max(abs(fine), least) for fine, before in pairs)])
-
-
-def gained(work: Array) -> float:
-    """Work [J] of a course of what was done so far (T,)."""
-    return float(work[-1] - work[0])
+        return largest_change([of_width, *self.changes_of_works(coarse)])
 
 
 def largest_change(changes: Sequence[float]) -> float:

@@ -20,7 +20,7 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.convergence import ABSOLUTE, RELATIVE
-from wristctl.simulation.hysteresis import converged, friction_cases, gained, largest_change
+from wristctl.simulation.hysteresis import Driven, converged, friction_cases, largest_change
 from wristctl.simulation.spatial_references import circumduction
 from wristctl.simulation.spool_driven import Spooled, SpooledWrist, spooled
 from wristctl.simulation.strokes import FrictionCase, held_in_space
@@ -29,8 +29,6 @@ from wristctl.simulation.strokes import FrictionCase, held_in_space
 _RUN_UP = 0.75
 # Step along the circle at which the statics are solved [rad]; chords between them are 1e-9 m off.
 _FINE = math.radians(0.1)
-# Share of the raw work below which a work is compared with that share.
-_LEAST_WORK = 0.01
 # Lag [rad] below which a change is compared with that.
 _LEAST_LAG = ABSOLUTE / RELATIVE
 
@@ -44,7 +42,7 @@ class CircleCase(NamedTuple):
 
 
 @dataclass(frozen=True)
-class HysteresisCircle:
+class HysteresisCircle(Driven):
     """One turn from ulnar through flexion; its last sample is where it begins."""
 
     case: CircleCase
@@ -70,28 +68,11 @@ class HysteresisCircle:
         """Mean bend less than that without friction [rad]."""
         return self.case.radius - float(np.mean(np.hypot(*self.course.bends[:-1].T)))
 
-    @property
-    def friction_work(self) -> float:
-        """Energy that friction took in the turn [J]."""
-        return gained(self.course.friction)
-
-    @property
-    def raw_work(self) -> float:
-        """Energy that the spools gave in the turn [J]."""
-        return gained(self.course.raw)
-
-    @property
-    def damped_work(self) -> float:
-        """Energy that the wrist's damping took in the turn [J]."""
-        return gained(self.course.damped)
-
     def change(self, coarse: HysteresisCircle, /) -> float:
         """Largest relative change of lag, radius and works from a longer step to this one."""
-        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
-        floors = {"lag": _LEAST_LAG, "narrower": _LEAST_LAG}
-        names = *floors, "friction_work", "raw_work", "damped_work"
-        pairs = [(getattr(self, name), getattr(coarse, name), floors.get(name, least)) for name in names]
-        return largest_change([abs(fine - before) / max(abs(fine), floor) for fine, before, floor in pairs])
+        pairs = [(self.lag, coarse.lag), (self.narrower, coarse.narrower)]
+        moved = [abs(fine - before) / max(abs(fine), _LEAST_LAG) for fine, before in pairs]
+        return largest_change([*moved, *self.changes_of_works(coarse)])
 
 
 def circle_cases(settings: HysteresisSettings) -> list[CircleCase]:
