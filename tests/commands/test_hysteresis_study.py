@@ -270,6 +270,7 @@ def test_an_analysis_of_hysteresis_reads_no_controller_and_no_run(done: Hysteres
     assert done.run is not None
     config = done.run.file("config.yaml").read_text()
     assert "\nhysteresis:" in config and "\n  of: hysteresis" in config and "\nsimulate:" not in config
+    assert done.run.manifest.about == "hysteresis"
     assert done.run.config.hysteresis == done.study.hysteresis and done.run.config.analyse.of == "hysteresis"
     with pytest.raises(UserError, match="reads no earlier run here - from_identified"):
         wristctl.analyse(of="hysteresis", from_identified=done)  # type: ignore[arg-type]

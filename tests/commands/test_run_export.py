@@ -158,6 +158,19 @@ def test_a_run_of_hysteresis_is_a_loop_that_can_be_measured(kind: str, tmp_path:
     assert first.columns["bend_y"].tolist() == [0.1, 0.2]
 
 
+def test_a_run_of_hysteresis_in_two_planes_has_both_bends_and_the_tendon_of_each_place(tmp_path: Path) -> None:
+    courses = {"loop": np.array([0, 0]), "time": np.array([0.0, 0.1]), "theta": np.array([0.1, 0.2]),
+               "bend_ulnar": np.array([0.08, 0.16]), "bend_flexion": np.array([0.06, 0.12])}  # fmt: skip
+    for place in (1, 2, 3):
+        courses |= {f"given_{place}": 1e-3 * place * np.ones(2), f"spool_{place}": place * np.array([4.0, 6.0])}
+    study = load_study([], ["analyse.of=hysteresis", "wrist.tendons=three"])
+    with start_run("analyse", study, "", tmp_path) as live:
+        live.table("data/courses.csv", courses)
+    log = read_log(export_run(Run(live.path), "csv", tmp_path / "loops.csv"))
+    assert log.columns["bend_y"].tolist() == [0.08, 0.16] and log.columns["bend_z"].tolist() == [0.06, 0.12]
+    assert log.columns["spool_3"].tolist() == [3e-3, 3e-3] and log.columns["tension_2"].tolist() == [8.0, 12.0]
+
+
 def test_a_motion_ends_where_the_wrist_left_its_range(tmp_path: Path) -> None:
     """In a simulate run and for each motion of a comparison, whose other motions stay whole."""
     bend, time = np.array([0.0, 0.5, np.nan, np.nan]), np.arange(4.0)

@@ -86,7 +86,8 @@ def prepare(
 def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str]) -> Iterator[LiveRun]:
     """A run directory in `out` for a prepared study, sealed with a report at the block's end, however it ends."""
     read, study = prepared.inputs.recorded(), with_places(prepared.study, sealed_references(prepared.foreign))
-    kind, about = prepared.procedure.kind, _about(prepared.procedure.section(prepared.study))
+    kind, section = prepared.procedure.kind, prepared.procedure.section(prepared.study)
+    about = _about(section) or prepared.procedure.works_on
     with start_run(kind, study, label, out, argv, read, _page, prepared.foreign, about) as run:
         yield run
 
