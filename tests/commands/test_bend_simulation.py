@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.export.run_data import open_log_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.simulate.command import SIMULATE
 from wristctl.commands.simulate.results import Simulated

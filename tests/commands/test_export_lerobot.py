@@ -15,8 +15,7 @@ import pandas as pd
 import pytest
 
 from tests.commands.made_motions import compared, rig_run, simulated
-from wristctl.commands.export.open_log_of_run import open_log_of
-from wristctl.commands.export.run_data import export_run
+from wristctl.commands.export.run_data import export_run, open_log_of
 from wristctl.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.records.folders_of_logs import files_of_recording

@@ -15,7 +15,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import columns_of, session
 from wristctl.commands.adoption import with_planes
-from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.export.run_data import open_log_of
 from wristctl.commands.hw_run.command import hw_run, plan
 from wristctl.commands.hw_run.results import Performed
 from wristctl.commands.inputs import Inputs

@@ -17,7 +17,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import columns_of, known_of, session
 from wristctl.arrays import Array
-from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.export.run_data import open_log_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.track.command import TRACK, Tracked
 from wristctl.config.camera import Markers, SceneSettings

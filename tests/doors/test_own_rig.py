@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from tests.doors.carrier import CARRIED, MARK, carrier
 from tests.doors.conftest import wristctl
 from wristctl.commands.adoption import adopted
-from wristctl.commands.export.open_log_of_run import _mass_is_said
+from wristctl.commands.export.run_data import _mass_is_said
 from wristctl.commands.rig_certificate import Certificate, RigCheck
 from wristctl.config.hw_run import HwRunSettings, RigRow
 from wristctl.config.study import Study

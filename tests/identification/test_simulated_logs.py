@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.export.open_log_of_run import open_log_of
 from wristctl.commands.export.recorded_motions import motions_of
+from wristctl.commands.export.run_data import open_log_of
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters

@@ -14,7 +14,7 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at
-from wristctl.records.log_order import parted
+from wristctl.records.log_mending import parted
 from wristctl.records.open_log import OpenLog
 
 FIELD = Path(__file__).parents[1] / "data" / "field"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from wristctl.errors import UserError
-from wristctl.study_files.error_messages import check_lengths, check_sizes
+from wristctl.study_files.error_messages import check_sizes
 from wristctl.study_files.load import read_study
 
 ASKED = {
@@ -25,7 +25,7 @@ ASKED = {
 @pytest.mark.parametrize("given", ASKED)
 def test_a_length_that_was_hardly_meant_in_metres_is_asked_about(given: str) -> None:
     with pytest.raises(UserError, match="give it in metres, or go on with --force") as refused:
-        check_lengths(*read_study([], [given]))
+        check_sizes(*read_study([], [given]))
     assert ASKED[given] in refused.value.what
     assert given.partition("=")[0] in str(refused.value) and refused.value.exit_code == 2
 
@@ -34,7 +34,7 @@ def test_a_length_that_was_hardly_meant_in_metres_is_asked_about(given: str) -> 
     "given", ["wrist.length=0.3", "simulate.loop.plant.tendon_radius=x1.05", "wrist.stiffness=80", "seed=7"]
 )
 def test_what_may_be_meant_is_not(given: str) -> None:
-    check_lengths(*read_study([], [given]))
+    check_sizes(*read_study([], [given]))
 
 
 SIZES = {

@@ -55,6 +55,11 @@ class Range(NamedTuple):
         return f"x{value:.12g}" if self.multiple else value
 
 
+def cannot_draw(key: str, why: str) -> PydanticCustomError:
+    """The error of a leaf that cannot be drawn."""
+    return PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": why})
+
+
 def drawn_value(source: Drawn, share: float) -> Any:
     """Value of a leaf at a share in [0, 1)."""
     if isinstance(source, str):
@@ -83,17 +88,17 @@ class Family(Section):
         data = self.loop.model_dump(exclude_unset=True)
         for key, source in self.draw.items():
             if not key.startswith(_OF_REFERENCE):
-                _put(data, key, drawn_value(source, shares[key]))
+                put_leaf(data, key, drawn_value(source, shares[key]))
         if self.together:
             for key, value in self.together[int(shares.get(TOGETHER, 0.0) * len(self.together))].items():
-                _put(data, key, value)
+                put_leaf(data, key, value)
         return Loop.model_validate(data)
 
     def motion(self, number: int, shares: Mapping[str, float]) -> Reference:
         """The reference of this number at these shares."""
         data = self.references[number].model_dump(exclude_unset=True)
         for key in self.drawn_of(number):
-            _put(data, key.removeprefix(_OF_REFERENCE), drawn_value(self.draw[key], shares[key]))
+            put_leaf(data, key.removeprefix(_OF_REFERENCE), drawn_value(self.draw[key], shares[key]))
         return Reference.model_validate(data)
 
     def settings_hash(self) -> str:
@@ -118,8 +123,7 @@ class Family(Section):
                 raise PydanticCustomError("draw", "row {number} of together is no world: {why}", context) from error
         for key, source in self.draw.items():
             if key.startswith(_OF_REFERENCE) and not any(key in self.drawn_of(n) for n in range(len(self.references))):
-                context = {"key": key, "why": "there is no such leaf"}
-                raise PydanticCustomError("draw", "cannot draw {key}: {why}", context)
+                raise cannot_draw(key, "there is no such leaf")
             if not isinstance(source, str) and not source:
                 raise PydanticCustomError("empty_draw", "{key} is drawn from nothing", {"key": key})
             for share in (0.0, 1.0 - 1e-12):
@@ -133,11 +137,11 @@ class Family(Section):
                 except ValidationError as error:
                     first = error.errors()[0]
                     why = "there is no such leaf" if first["type"] == "extra_forbidden" else first["msg"]
-                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": why}) from error
+                    raise cannot_draw(key, why) from error
         return self
 
 
-def _put(data: dict[str, Any], key: str, value: Any) -> None:
+def put_leaf(data: dict[str, Any], key: str, value: Any) -> None:
     """Set a leaf by its dotted name."""
     *sections, leaf = key.split(".")
     for section in sections:

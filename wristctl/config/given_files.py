@@ -4,22 +4,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 
 from wristctl.config.leaves import with_leaves
+from wristctl.config.section import quantity, seldom
 
 
 def given_file(meaning: str, default: tuple[()] | None = None) -> Any:
     """A leaf that names a file, or several; config.yaml leaves it out where none is given."""
-    extra: JsonDict = {"unit": "", "source": "", "file": True, "unsaid": True}
-    return Field(default, description=meaning, json_schema_extra=extra)
+    return quantity(default, "", meaning, marks=("file", "unsaid"))
 
 
 def of_file(meaning: str) -> Any:
     """A leaf that says how a file is read; left out of config.yaml likewise."""
-    return Field(None, description=meaning, json_schema_extra={"unit": "", "source": "", "unsaid": True})
+    return seldom(None, "", meaning)
 
 
 def columns_of_file() -> Any:

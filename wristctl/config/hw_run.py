@@ -1,6 +1,6 @@
 """Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import ValidationInfo, field_validator, model_validator
@@ -186,36 +186,30 @@ class RigSettings(Section):
         return {"level": level, **given} if isinstance(given, Mapping) else given
 
     @model_validator(mode="after")
-    def _two_planes(self) -> Self:
-        if self.planes == 1:
-            return self
-        plant, emulated = self.bench.plant.model, self.port is None and getattr(self, "rig", None) is None
-        if emulated and plant not in PLANTS_IN_SPACE:
-            raise Unfitting(f"plant {plant} bends in one plane", f"bench.plant.model: {', '.join(PLANTS_IN_SPACE)}")
-        numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
-        if len(set(numbers)) < len(numbers):
-            raise Unfitting(f"four markers need different ids, they are {numbers}", "other ids in markers_2")
+    def _fits_together(self) -> Self:
+        for problem, fix in self._misfits():
+            raise Unfitting(problem, fix)
         return self
 
-    @model_validator(mode="after")
-    def _board_ahead_of_host(self) -> Self:
+    def _misfits(self) -> Iterator[tuple[str, str]]:
+        """What does not fit together, and what would."""
+        plant, emulated = self.bench.plant.model, self.port is None and getattr(self, "rig", None) is None
+        if self.planes == 2 and emulated and plant not in PLANTS_IN_SPACE:
+            yield f"plant {plant} bends in one plane", f"bench.plant.model: {', '.join(PLANTS_IN_SPACE)}"
+        numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
+        if self.planes == 2 and len(set(numbers)) < len(numbers):
+            yield f"four markers need different ids, they are {numbers}", "other ids in markers_2"
         motors, (least, most) = self.actuator, RAMPS
         if not least <= motors.ramp <= most:
-            fix = f"actuator.ramp of {least:g} to {most:g}"
-            raise Unfitting(f"no board ramps at {motors.ramp:g} steps/s^2", fix)
+            yield f"no board ramps at {motors.ramp:g} steps/s^2", f"actuator.ramp of {least:g} to {most:g}"
         if motors.ramp < motors.step_acceleration:
             problem = (
                 f"the board's ramp ({motors.ramp:g} steps/s^2) is slower than the host changes step rates "
                 f"(actuator.step_acceleration, {motors.step_acceleration:g} steps/s^2)"
             )
-            raise Unfitting(problem, f"actuator.ramp of at least {motors.step_acceleration:g}, or four times as much")
-        return self
-
-    @model_validator(mode="after")
-    def _spools_and_frames(self) -> Self:
+            yield problem, f"actuator.ramp of at least {motors.step_acceleration:g}, or four times as much"
         if not self.actuator.winds or self.sensor.level != "camera":
-            raise ValueError("a rig has actuator.level: tendon and sensor.level: camera")
-        return self
+            yield "a rig has actuator.level: tendon and sensor.level: camera", ""
 
 
 class CalibrateWristSettings(RigSettings):
@@ -286,16 +280,44 @@ class HwRunSettings(RigSettings):
         live = isinstance(given, Mapping) and comes_live(given.get("reference"))
         return {"directions": ("ulnar",), "push": {"force": 0.0}, **given} if live else given
 
-    @model_validator(mode="after")
-    def _live_by_the_wall_clock(self) -> Self:
+    def _misfits(self) -> Iterator[tuple[str, str]]:
+        yield from super()._misfits()
         trials = len(self.rows) * len(set(self.directions)) * self.repetitions
         trials *= self.without_push + (self.push.force != 0.0)
         if self.reference.is_live and trials != 1:
             fix = "one controller, direction and repetition; others follow its record (reference.file)"
-            raise Unfitting(f"a live reference is followed in one trial, and these settings have {trials}", fix)
+            yield f"a live reference is followed in one trial, and these settings have {trials}", fix
         if self.reference.is_live and self.port is None and self.rig is None and not self.real_time:
-            raise Unfitting("a live reference comes by the wall clock, and this bench has virtual time", "--real-time")
-        return self
+            yield "a live reference comes by the wall clock, and this bench has virtual time", "--real-time"
+        if self.planes == 1 and not self.planes_are_open:
+            if between := [name for name in self.directions if name in get_args(Between)]:
+                yield f"{between[0]} lies between two planes, and the rig bends in one", "planes: 2"
+            if self.push_toward_deg is not None:
+                yield "push_toward_deg is of a rig in two planes, and this one bends in one", "planes: 2"
+        for name in ("port", "calibration", "load_cells", "optics", "optics_2", "video", "real_time"):
+            if self.rig is not None and getattr(self, name):
+                yield f"{name} is of the board with its cameras, and rig names another rig", f"no {name}, or no rig"
+        if self.push.force == 0.0 and not self.without_push:
+            yield "without_push: false and push.force: 0 leave no trial", ""
+        period, limits = self.control_period, self.safety
+        if self.sensor.frame_rate * period > 1.0:
+            yield "sensor.frame_rate is above one frame per control_period", ""
+        if self.positions == "stored" and self.calibration is None:
+            yield "positions: stored needs a calibration run", ""
+        if self.rate_life >= limits.watchdog:
+            problem = (
+                f"a step rate lives for {self.rate_life:g} s ({_LIFE_PERIODS:g} times control_period {period:g} s, "
+                f"{_LEAST_LIFE:g} s at least), which must be below safety.watchdog ({limits.watchdog:g} s)"
+            )
+            shorter = f"control_period below {limits.watchdog / _LIFE_PERIODS:g}, or "
+            fix = f"safety.watchdog above {self.rate_life:g}"
+            yield problem, (shorter if limits.watchdog > _LEAST_LIFE else "") + fix
+        if period + limits.late >= limits.watchdog:
+            problem = (
+                f"a tick that is late by safety.late ({limits.late:g} s) comes {period + limits.late:g} s after the "
+                f"one before: not below safety.watchdog ({limits.watchdog:g} s)"
+            )
+            yield problem, f"safety.late below {limits.watchdog - period:g}, or a longer safety.watchdog"
 
     @property
     def planes_are_open(self) -> bool:
@@ -306,60 +328,10 @@ class HwRunSettings(RigSettings):
         """Settings of a rig with so many planes. Raises ValidationError where others do not fit them."""
         return self.model_validate({name: getattr(self, name) for name in self.model_fields_set} | {"planes": planes})
 
-    @model_validator(mode="after")
-    def _planes_for_the_motion(self) -> Self:
-        if self.planes == 2 or self.planes_are_open:
-            return self
-        if between := [name for name in self.directions if name in get_args(Between)]:
-            raise Unfitting(f"{between[0]} lies between two planes, and the rig bends in one", "planes: 2")
-        if self.push_toward_deg is not None:
-            raise Unfitting("push_toward_deg is of a rig in two planes, and this one bends in one", "planes: 2")
-        return self
-
-    @model_validator(mode="after")
-    def _one_rig(self) -> Self:
-        if self.rig is None:
-            return self
-        for name in ("port", "calibration", "load_cells", "optics", "optics_2", "video", "real_time"):
-            if getattr(self, name):
-                raise Unfitting(
-                    f"{name} is of the board with its cameras, and rig names another rig", f"no {name}, or no rig"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _something_to_do(self) -> Self:
-        if self.push.force == 0.0 and not self.without_push:
-            raise ValueError("without_push: false and push.force: 0 leave no trial")
-        if self.sensor.frame_rate * self.control_period > 1.0:
-            raise ValueError("sensor.frame_rate is above one frame per control_period")
-        if self.positions == "stored" and self.calibration is None:
-            raise ValueError("positions: stored needs a calibration run")
-        return self
-
     @property
     def rate_life(self) -> float:
         """Seconds for which the board follows a step rate without another: two ticks may be lost."""
         return max(_LEAST_LIFE, _LIFE_PERIODS * self.control_period)
-
-    @model_validator(mode="after")
-    def _ticks_before_the_watchdog(self) -> Self:
-        period, limits = self.control_period, self.safety
-        if self.rate_life >= limits.watchdog:
-            problem = (
-                f"a step rate lives for {self.rate_life:g} s ({_LIFE_PERIODS:g} times control_period {period:g} s, "
-                f"{_LEAST_LIFE:g} s at least), which must be below safety.watchdog ({limits.watchdog:g} s)"
-            )
-            shorter = f"control_period below {limits.watchdog / _LIFE_PERIODS:g}, or "
-            fix = f"safety.watchdog above {self.rate_life:g}"
-            raise Unfitting(problem, (shorter if limits.watchdog > _LEAST_LIFE else "") + fix)
-        if period + limits.late >= limits.watchdog:
-            problem = (
-                f"a tick that is late by safety.late ({limits.late:g} s) comes {period + limits.late:g} s after the "
-                f"one before: not below safety.watchdog ({limits.watchdog:g} s)"
-            )
-            raise Unfitting(problem, f"safety.late below {limits.watchdog - period:g}, or a longer safety.watchdog")
-        return self
 
     def _emulated_world(self) -> Plant:
         """The bench as the plant of a loop: what of its motors and camera is not as believed stands there."""

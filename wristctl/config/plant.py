@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
-from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -34,14 +33,12 @@ NotNegative = Annotated[float, Field(ge=0)] | Scale | None
 
 def truth(unit: str, meaning: str) -> Any:
     """A leaf as it is in the world; config.yaml leaves it out where it is as believed."""
-    extra: JsonDict = {"unit": unit, "source": "", "unsaid": True}
-    return Field(None, description=f"{meaning}, or x1.05 of what is believed", json_schema_extra=extra)
+    return seldom(None, unit, f"{meaning}, or x1.05 of what is believed")
 
 
 def fact(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
     """A leaf of the world that no controller believes anything of; config.yaml leaves it out where it is not given."""
-    extra: JsonDict = {"unit": unit, "source": "assumed", "unsaid": True}
-    return Field(default, description=meaning, json_schema_extra=extra, **constraints)
+    return quantity(default, unit, meaning, "assumed", ("unsaid",), **constraints)
 
 
 def unsaid(default: Overrides) -> Any:

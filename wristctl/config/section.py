@@ -19,9 +19,14 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, populate_by_name=True)
 
 
-def quantity(default: Any, unit: str, meaning: str, source: str = "", **constraints: Any) -> Any:
-    """A leaf with its unit, meaning and source ("paper", "assumed", ...), which docs and config.yaml print."""
-    extra: JsonDict = {"unit": unit, "source": source}
+def quantity(
+    default: Any, unit: str, meaning: str, source: str = "", marks: tuple[str, ...] = (), **constraints: Any
+) -> Any:
+    """A leaf with its unit, meaning and source ("paper", "assumed", ...), which docs and config.yaml print.
+
+    Its marks are `unsaid`, where config.yaml leaves it out at its default, and `file`, where it names files.
+    """
+    extra: JsonDict = {"unit": unit, "source": source, **dict.fromkeys(marks, True)}
     return Field(default, description=meaning, json_schema_extra=extra, **constraints)
 
 
@@ -32,8 +37,7 @@ def choice(default: Any, meaning: str, source: str = "", **constraints: Any) -> 
 
 def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
     """A leaf that config.yaml leaves out where it has its default."""
-    extra: JsonDict = {"unit": unit, "source": "", "unsaid": True}
-    return Field(default, description=meaning, json_schema_extra=extra, **constraints)
+    return quantity(default, unit, meaning, marks=("unsaid",), **constraints)
 
 
 @dataclass(frozen=True, eq=False)  # a table has no hash, and a union of types asks for one

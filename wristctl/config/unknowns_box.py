@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
 from pydantic import ValidationError, model_validator
-from pydantic_core import PydanticCustomError
 
-from wristctl.config.families import Drawn, drawn_value
+from wristctl.config.families import Drawn, cannot_draw, drawn_value, put_leaf
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.wrist import WristParameters
@@ -76,16 +75,14 @@ class Box(Section):
             values[name], leaves = unknown.at(shares[name])
             for leaf, value in ({name: values[name]} if leaves is None else leaves).items():
                 root, _, below_root = leaf.partition(".")
-                _put(data[root] if root in _ROOTS else data[""], below_root if root in _ROOTS else leaf, value)
+                put_leaf(data[root] if root in _ROOTS else data[""], below_root if root in _ROOTS else leaf, value)
         measured, horizon = data[""].pop("measured", "ideal"), data[""].pop("horizon", self.horizon)
-        if data[""]:
-            leaf = next(iter(data[""]))
-            raise PydanticCustomError(
-                "draw", "cannot draw {key}: {why}", {"key": leaf, "why": f"there is no setting {leaf}"}
-            )
+        for leaf in data[""]:
+            raise cannot_draw(leaf, f"there is no setting {leaf}")
         loop = Loop.model_validate(data["loop"])
-        if measured == "observer":
-            loop = _observed(loop)
+        if measured == "observer":  # behind a camera without noise, delay or lost frames
+            perfect = {"level": "camera", "delay_frames": 0.0, "noise_deg": 0.0, "dropped": 0.0}
+            loop = loop.model_copy(update={"sensor": loop.sensor.model_copy(update=perfect)})
         wrist = WristParameters.model_validate(data["wrist"])
         return PaperSetting(wrist, loop, Reference.model_validate(data["reference"]), horizon, measured, values)
 
@@ -97,28 +94,10 @@ class Box(Section):
                     setting = self.setting(WristParameters(), dict.fromkeys(self.unknowns, 0.5) | {key: share})
                 except ValidationError as error:
                     why = error.errors()[0]
-                    leaf = ".".join(map(str, why["loc"]))
-                    reason = (
-                        f"there is no setting {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
-                    )
-                    raise PydanticCustomError(
-                        "draw", "cannot draw {key}: {why}", {"key": key, "why": reason}
-                    ) from error
+                    leaf, missing = ".".join(map(str, why["loc"])), why["type"] == "extra_forbidden"
+                    reason = f"there is no setting {leaf}" if missing else f"{leaf}: {why['msg']}"
+                    raise cannot_draw(key, reason) from error
                 if setting.measured not in MEASURED or setting.horizon > self.horizon:
-                    reason = f"measured is one of {', '.join(MEASURED)}, and horizon at most {self.horizon:g} s"
-                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": reason})
+                    choices = ", ".join(MEASURED)
+                    raise cannot_draw(key, f"measured is one of {choices}, and horizon at most {self.horizon:g} s")
         return self
-
-
-def _observed(loop: Loop) -> Loop:
-    """The observer behind a camera without noise, delay or lost frames."""
-    perfect = {"level": "camera", "delay_frames": 0.0, "noise_deg": 0.0, "dropped": 0.0}
-    sensor = loop.sensor.model_copy(update=perfect)
-    return loop.model_copy(update={"sensor": sensor})
-
-
-def _put(data: dict[str, Any], key: str, value: Any) -> None:
-    *sections, leaf = key.split(".")
-    for section in sections:
-        data = data.setdefault(section, {})
-    data[leaf] = value

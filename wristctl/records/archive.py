@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.errors import FILE, UserError, writing
-from wristctl.plain_files import LARGEST_DATA, read_plain, unreadable
-from wristctl.records.files import PART, replacing, sync, sync_all
+from wristctl.plain_files import LARGEST_DATA, unreadable
+from wristctl.records.files import PART, content_of, replacing, sync, sync_all, write_bytes
 from wristctl.records.index import dated
 from wristctl.records.lineage import each_once, input_run
 from wristctl.records.lock import LOCK, RunLock
@@ -30,7 +30,8 @@ from wristctl.sha256sums import read_seal
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
 # Most files of an archive: ten times the files of a full study of all laws.
 MOST_FILES = 50_000
-_ID = re.compile(r"[A-Za-z0-9_.-]{1,200}")
+# A run's id begins with the time that it was begun at.
+_ID = re.compile(r"[0-9TZ]{16}-[A-Za-z0-9_.-]{0,183}")
 # Largest ratio of unpacked to packed size. A higher ratio is no run data.
 _LARGEST_SHARE = 200
 _LARGEST_LIST = 1 << 20
@@ -72,7 +73,7 @@ def pack(run: Run, file: Path) -> list[Run]:
         _write(archive, PACK, json.dumps(contents, indent=2).encode() + b"\n")
         for member in runs:
             for name in _packed(member):
-                _write(archive, f"{member.id}/{name}", _content(member.path / name))
+                _write(archive, f"{member.id}/{name}", content_of(member.path / name, LARGEST_DATA, links=False))
     return runs
 
 
@@ -80,13 +81,6 @@ def _packed(run: Run) -> list[str]:
     """Names of the files of a run that travel."""
     beside = [name for name in (SUMS, SIGNATURE) if run.has(name)]
     return [*sorted(read_seal(run.path) or ()), *beside]
-
-
-def _content(file: Path) -> bytes:
-    try:
-        return read_plain(file, LARGEST_DATA, links=False)
-    except OSError as error:
-        raise unreadable(error, file) from error
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -114,26 +108,20 @@ def unpack(file: Path, results: Path) -> Unpacked:
     """
     if file.exists() and not file.is_file():
         raise UserError("no plain file", str(file), "name the archive that `wristctl runs pack` wrote")
-    with _archive(file) as archive:
+    with _reading(file):
+        archive = zipfile.ZipFile(file)
+    with archive:
         with _reading(file):
-            about, entries = _contents(archive, file)
+            run, runs, entries = _contents(archive, file)
         with writing(results):
             results.mkdir(parents=True, exist_ok=True)
             scratch, lock = _scratch(results)
         try:
             _extract(archive, entries, scratch, file)
-            return _moved(about, scratch, results, file)
+            return _moved(run, runs, scratch, results, file)
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
             lock.release()
-
-
-@contextmanager
-def _archive(file: Path) -> Iterator[zipfile.ZipFile]:
-    with _reading(file):
-        archive = zipfile.ZipFile(file)
-    with archive:
-        yield archive
 
 
 @contextmanager
@@ -155,13 +143,8 @@ def _scratch(results: Path) -> tuple[Path, RunLock]:
             return scratch, RunLock(scratch)
 
 
-class _About(NamedTuple):
-    run: str
-    runs: list[str]
-
-
-def _contents(archive: zipfile.ZipFile, file: Path) -> tuple[_About, list[zipfile.ZipInfo]]:
-    """Runs and entries of an archive. Raises UserError for a name that no run may have."""
+def _contents(archive: zipfile.ZipFile, file: Path) -> tuple[str, list[str], list[zipfile.ZipInfo]]:
+    """Run, runs and entries of an archive. Raises UserError for a name that no run may have."""
     entries = archive.infolist()
     if len(entries) > MOST_FILES:
         raise UserError(f"it holds {len(entries)} files, and at most {MOST_FILES} are taken", str(file), _FIX)
@@ -172,16 +155,17 @@ def _contents(archive: zipfile.ZipFile, file: Path) -> tuple[_About, list[zipfil
         raise UserError("a name stands there twice", str(file), _FIX)
     if long := next((name for name in names if len(name.encode(errors="replace")) > _LONGEST_NAME), None):
         raise UserError(f"a name of more than {_LONGEST_NAME} bytes: {long[:40]!r}...", str(file), _FIX)
-    about = _about(archive, file)
+    run, runs = _about(archive, file)
     folders = {name[:position] for name in names for position, character in enumerate(name) if character == "/"}
     for entry in entries:
-        _check_name(entry, about.runs, file)
+        _check_name(entry, runs, file)
         if entry.filename in folders:
             raise UserError(f"a file and a folder of one name: {entry.filename!r}", str(file), _FIX)
-    return about, [entry for entry in entries if entry.filename != PACK]
+    return run, runs, [entry for entry in entries if entry.filename != PACK]
 
 
-def _about(archive: zipfile.ZipFile, file: Path) -> _About:
+def _about(archive: zipfile.ZipFile, file: Path) -> tuple[str, list[str]]:
+    """The run that an archive is about, and all that are in it."""
     if PACK not in archive.namelist() or archive.getinfo(PACK).file_size > _LARGEST_LIST:
         raise UserError(f"no archive of runs: it has no {PACK}", str(file), _FIX)
     try:
@@ -193,14 +177,10 @@ def _about(archive: zipfile.ZipFile, file: Path) -> _About:
         raise UserError(f"{PACK} names no runs", str(file), _FIX)
     if header.get("schema") != SCHEMA:
         raise UserError("packed by another wristctl than this one", str(file), "upgrade wristctl")
-    if not all(isinstance(run_id, str) and _is_id(run_id) for run_id in runs) or len(set(runs)) < len(runs):
+    ids = [name for name in runs if isinstance(name, str) and _ID.fullmatch(name) and dated(name)]
+    if len(set(ids)) < len(runs):
         raise UserError("a name that is no run's id", str(file), _FIX)
-    return _About(header["run"], runs)
-
-
-def _is_id(name: str) -> bool:
-    """Whether a run may be called so: its id begins with the time that it was begun at."""
-    return _ID.fullmatch(name) is not None and dated(name) != "" and name[16:17] == "-"
+    return header["run"], ids
 
 
 def _check_name(entry: zipfile.ZipInfo, runs: list[str], file: Path) -> None:
@@ -238,36 +218,30 @@ def _pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: Path) -> Ite
             yield piece
 
 
-def _moved(about: _About, scratch: Path, results: Path, file: Path) -> Unpacked:
+def _moved(run: str, runs: list[str], scratch: Path, results: Path, file: Path) -> Unpacked:
     """The runs in their place, once all are seen to be what was sealed."""
-    destinations = {name: results / name for name in about.runs}
-    for name in about.runs:
-        for path, problem in _problems(scratch / name):
-            raise UserError(
-                f"{path}: {problem}", f"{name} in {file}", "ask for it again: nothing was kept", exit_code=3
-            )
+    destinations = {name: results / name for name in runs}
+    for name in runs:
+        there = (scratch / name).is_dir()
+        for path, problem in Run(scratch / name).problems() if there else [(name, "is not in it")]:
+            fix = "ask for it again: nothing was kept"
+            raise UserError(f"{path}: {problem}", f"{name} in {file}", fix, exit_code=3)
         if lexists(destinations[name]):
             _check_same(destinations[name], scratch / name)
-    new = [name for name in about.runs if not lexists(destinations[name])]
-    present = [Run(destinations[name]) for name in about.runs if name not in new]
+    new = [name for name in runs if not lexists(destinations[name])]
+    present = [Run(destinations[name]) for name in runs if name not in new]
     signed = [run for run in present if _signed_too(run.path, scratch / run.id)]
     with writing(results):
         for name in new:
             (scratch / name).rename(destinations[name])
         sync(results)
-    return Unpacked(Run(destinations[about.run]), [Run(destinations[name]) for name in new], present, signed)
-
-
-def _problems(folder: Path) -> Iterator[tuple[str, str]]:
-    if not folder.is_dir():
-        yield folder.name, "is not in it"
-    else:
-        yield from Run(folder).problems()
+    return Unpacked(Run(destinations[run]), [Run(destinations[name]) for name in new], present, signed)
 
 
 def _check_same(existing: Path, arrived: Path) -> None:
     """UserError where what is here under a run's id is another run, or that run and damaged."""
-    if not lexists(existing / SUMS) or _content(existing / SUMS) != _content(arrived / SUMS):
+    sums = [content_of(folder / SUMS, links=False) for folder in (existing, arrived) if lexists(folder / SUMS)]
+    if len(sums) < 2 or sums[0] != sums[1]:
         problem = "a run of this id is here already, and is another"
         raise UserError(problem, str(existing), "another results folder, with --out", exit_code=3)
     try:
@@ -281,6 +255,5 @@ def _signed_too(existing: Path, arrived: Path) -> bool:
     """Give a run its signature of the archive where it has none here; whether that was so."""
     if lexists(existing / SIGNATURE) or not (arrived / SIGNATURE).is_file():
         return False
-    with replacing(existing / SIGNATURE) as temporary:
-        temporary.write_bytes((arrived / SIGNATURE).read_bytes())
+    write_bytes(existing / SIGNATURE, (arrived / SIGNATURE).read_bytes())
     return True

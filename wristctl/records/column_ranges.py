@@ -13,8 +13,8 @@ from wristctl.records.recorded_table import Cells
 
 TENDON_OFFSET = 0.0141
 """Distance of the tendons from the axis [m] of a wrist that nobody has described."""
-SIZES = (2**16, 2**32)
-"""Counts after which a counter begins again."""
+# Counts after which a counter begins again.
+_SIZES = (2**16, 2**32)
 FACTOR_OF_A_COUNT, FACTOR_OF_A_UNIT = 5.0, 10.0
 """Factors by which spools may go further, or less far, than the bend takes, for the length of a count or for a unit."""
 
@@ -40,17 +40,18 @@ def are_whole(numbers: Array) -> bool:
     return bool(np.all(np.abs(there - np.round(there)) <= 1e-6 * np.maximum(1.0, np.abs(there))))
 
 
-def turns_of(counts: Array, size: int) -> Array | None:
-    """Number of turns before each count (T,); None where the counts are not of a counter that wraps at this size."""
-    if counts.min() < -size // 2 or counts.max() >= size or np.ptp(counts) >= size:
-        return None
-    steps = np.diff(counts)
-    wraps = np.abs(steps) > 0.5 * size
-    rest = steps - size * np.sign(steps) * wraps
-    if not wraps.any() or np.any(np.abs(rest) > _SHARE * size):
-        return None
-    turns: Array = np.concatenate([[0.0], np.cumsum(-np.sign(steps) * wraps)])
-    return turns
+def counter_of(numbers: Array) -> tuple[int, Array] | None:
+    """Counts after which a counter begins again, and its turns before each number (T,); None of no such counter."""
+    counts = np.round(numbers)
+    for size in _SIZES if are_whole(numbers) else ():
+        if counts.min() < -size // 2 or counts.max() >= size or np.ptp(counts) >= size:
+            continue
+        steps = np.diff(counts)
+        wraps = np.abs(steps) > 0.5 * size
+        rest = steps - size * np.sign(steps) * wraps
+        if wraps.any() and not np.any(np.abs(rest) > _SHARE * size):
+            return size, np.concatenate([[0.0], np.cumsum(-np.sign(steps) * wraps)])
+    return None
 
 
 def range_of(numbers: Array) -> float:
@@ -61,12 +62,8 @@ def range_of(numbers: Array) -> float:
     there = numbers[np.isfinite(numbers)]
     if len(there) < 3:
         return math.nan
-    if are_whole(there):
-        for size in SIZES:
-            turns = turns_of(np.round(there), size)
-            if turns is not None:
-                there = there + size * turns
-                break
+    if (counter := counter_of(there)) is not None:
+        there = there + counter[0] * counter[1]
     reach = float(np.ptp(there))
     return reach if float(np.abs(np.diff(there)).max()) <= 0.5 * reach else math.nan
 

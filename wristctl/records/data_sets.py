@@ -39,7 +39,9 @@ class DataSet:
             return {file.relative_to(folder).as_posix(): file for file in self._recordings(tables)}
         found = {}
         for ending, digest in self.hashes.items():
-            files = sorted(file for file in folder.rglob(f"*{Path(ending).name}") if _named(file, ending))
+            # folders are apart by /, or in the file's name by two underscores
+            named = (file for file in folder.rglob(f"*{Path(ending).name}"))
+            files = sorted(file for file in named if file.as_posix().replace("__", "/").endswith(ending))
             if not files:
                 raise UserError(f"no file {ending}", str(folder), f"clone {self.place}")
             alike = (file for file in files if len(files) > 1 and sha256_of(file) == digest)
@@ -90,11 +92,6 @@ class DataSet:
             if sha256_of(files[ending]) != digest:
                 problem = "not the published file: its SHA-256 differs"
                 raise UserError(problem, str(files[ending]), f"clone {self.place}")
-
-
-def _named(file: Path, ending: str) -> bool:
-    """Whether a path ends so, folders apart by / or, in the file's name, by two underscores."""
-    return file.as_posix().replace("__", "/").endswith(ending)
 
 
 _OPEN, _CLOSED = "imu_openloop/spring_test_", "imu_closeloop/frontier_test_"

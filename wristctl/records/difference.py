@@ -66,21 +66,16 @@ def _leaves(value: Any, path: str) -> list[tuple[str, Any]]:
 
 
 def _code(a: Run, b: Run) -> list[Change]:
-    foreign = changes(a.manifest.code.foreign, b.manifest.code.foreign)
-    foreign_changes = [Change(change.name, _short(change.before), _short(change.after)) for change in foreign]
+    foreign = _shortened(changes(a.manifest.code.foreign, b.manifest.code.foreign))
     if a.manifest.code.tree_sha256 == b.manifest.code.tree_sha256:
-        return foreign_changes
+        return foreign
     facts = []
     for run in (a, b):
         code = run.manifest.code
         commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
         facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
     files = changes(*(_listing(run, SOURCES, "  ", 1) for run in (a, b)))
-    return [
-        *foreign_changes,
-        *changes(*facts),
-        *(Change(change.name, _short(change.before), _short(change.after)) for change in files),
-    ]
+    return [*foreign, *changes(*facts), *_shortened(files)]
 
 
 def _environment(a: Run, b: Run) -> list[Change]:
@@ -101,5 +96,6 @@ def _listing(run: Run, name: str, separator: str, key: int) -> dict[str, str]:
     return {pair[key]: pair[1 - key] for pair in pairs}
 
 
-def _short(digest: str | None) -> str | None:
-    return digest[:12] if digest else None
+def _shortened(hashes: list[Change]) -> list[Change]:
+    """Changes of hashes, which twelve letters tell apart."""
+    return [Change(name, before and before[:12], after and after[:12]) for name, before, after in hashes]

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wristctl.errors import OUT, Phrase, UserError, writing
-from wristctl.plain_files import LARGEST_DATA, LINK, NOT_PLAIN, open_plain
+from wristctl.plain_files import LARGEST, LARGEST_DATA, LINK, NOT_PLAIN, open_plain, read_plain, unreadable
 
 # End of the hidden name of a file that is being written.
 PART = ".part"
@@ -53,6 +53,14 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
+
+
+def content_of(path: Path, largest: int = LARGEST, links: bool = True) -> bytes:
+    """Content of a plain file of at most so many bytes. Raises UserError where it cannot be read."""
+    try:
+        return read_plain(path, largest, links)
+    except OSError as error:
+        raise unreadable(error, path) from error
 
 
 def sync(path: Path) -> None:

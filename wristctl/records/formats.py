@@ -30,12 +30,15 @@ _LINES = 50_000
 _LARGEST_SHARE = 100
 
 
-def write_table(path: Path, columns: Columns) -> None:
-    """Columns as CSV under their names; floats are written so that they read back exactly, nan as nothing."""
+def write_table(path: Path, columns: Columns, by: Phrase = OUT) -> None:
+    """Columns as CSV under their names; floats are written so that they read back exactly, nan as nothing.
+
+    `by` is the argument that names another place, where this one cannot be written.
+    """
     import numpy as np
 
     arrays = [np.asarray(column) for _, column in columns.items()]
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with replacing(path, by) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns.keys())
         for begin in range(0, max(map(len, arrays), default=0), _LINES):

@@ -93,7 +93,8 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
                 current[name] = [stamp, asdict(entry)]
         entries.append(entry)
     if renew and current != remembered:
-        _write_index(results, current)
+        index = {"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": current}
+        write_beside(results, INDEX, json.dumps(index))
     return entries
 
 
@@ -168,13 +169,6 @@ def _read_index(results: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError):
         pass
     return {}
-
-
-def _write_index(results: Path, runs: dict[str, Any]) -> None:
-    """Replace the index."""
-    write_beside(
-        results, INDEX, json.dumps({"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": runs})
-    )
 
 
 def write_beside(results: Path, name: str, text: str) -> None:

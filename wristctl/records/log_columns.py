@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from wristctl.arrays import Array
 from wristctl.errors import Argument, UserError, meant, nearest
 from wristctl.records.column_guesses import UNIT_WORDS, Guess, guesses
 from wristctl.records.column_ranges import (
-    TENDON_OFFSET,
     count_told,
     numbers_of,
     range_of,
@@ -117,28 +116,32 @@ def mapped_names(text: str) -> dict[str, tuple[str, str]]:
     mapped: dict[str, tuple[str, str]] = {}
     for entry in entries_of(text):
         standard, equals, theirs = entry.partition("=")
-        head = _HEAD.fullmatch(theirs)
+        head, unit = _parted(theirs)
         name = SYNONYMS.get(standard.strip(), standard.strip())
-        if not equals or head is None or not head[1]:
+        if not equals or not head:
             raise UserError(f"{entry.strip()!r} maps no column", "columns", "time=t [ms], bend_y=imu [deg]")
         if units_of(name) is None and name not in WORDS:
             fix = meant(name, [*COLUMNS, *WORDS, "spool_1", "tension_1", "current_1"])
             raise UserError(f"{name} is no column of an open log", "columns", fix)
-        mapped[head[1]] = name, head[2] or ""
+        mapped[head] = name, unit
     return mapped
+
+
+def _parted(head: str) -> tuple[str, str]:
+    """Name and unit of a column in a header."""
+    match = _HEAD.fullmatch(head)
+    return (match[1], match[2] or "") if match else (head.strip(), "")
 
 
 def name_of(head: str) -> str:
     """Name of a column in a header, without its unit."""
-    match = _HEAD.fullmatch(head)
-    return match[1] if match else head.strip()
+    return _parted(head)[0]
 
 
 def head_of_open_log(head: str) -> str | None:
     """A head that names a column of an open log in a unit of its own, such as `spool_1 [m]`; None of any other."""
-    match = _HEAD.fullmatch(head)
-    units = units_of(match[1]) if match else None
-    return head if match and units and (match[2] or "") in units else None
+    name, unit = _parted(head)
+    return head if unit in (units_of(name) or ()) else None
 
 
 def chosen_columns(
@@ -148,8 +151,7 @@ def chosen_columns(
     others: bool,
     dated: Collection[int],
     where: str,
-    cells: Sequence[Cells] = (),
-    tendon_offset: float = TENDON_OFFSET,
+    proposed: Callable[[], Proposal],
 ) -> dict[int, ReadColumn]:
     """The columns that are read, by their places in a header.
 
@@ -170,17 +172,14 @@ def chosen_columns(
         Places of columns that hold dates or Unix times, whose unit they say themselves.
     where
         File and line of the header, for errors.
-    cells
-        Columns of the file, whose ranges tell units that are not said.
-    tendon_offset
-        Distance of the tendons from the axis [m], for the same.
+    proposed
+        The text for `--columns` that may be meant, for errors.
     """
     chosen, missing, unknown = dict[int, ReadColumn](), dict(names), list[int]()
     for place, cell in enumerate(heads):
         if len(cell) > _LONGEST:
             raise UserError(f"a column's name has {len(cell)} letters", where, f"a header such as {EXAMPLE}")
-        match = _HEAD.fullmatch(cell)
-        written, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
+        written, unit = _parted(cell)
         name = SYNONYMS.get(written, written)
         if written in names:
             name, mapped_unit = missing.pop(written, names[written])
@@ -198,11 +197,10 @@ def chosen_columns(
             continue
         factor = _factor(unit, known)
         if factor is None:
-            proposed = proposal(heads, names, cells, tendon_offset)
-            raise _without_factor(written, name, unit, known, proposed, where)
+            raise _without_factor(written, name, unit, known, proposed(), where)
         chosen[place] = ReadColumn(name, factor)
     if unknown:
-        raise _unknown(heads, unknown, units, proposal(heads, names, cells, tendon_offset), where)
+        raise _unknown(heads, unknown, units, proposed(), where)
     for theirs, (name, _) in missing.items():
         fix = meant(theirs, [name_of(head) for head in heads])
         raise UserError(f"no column {theirs!r}, which is to be {name}", where, fix)
@@ -255,26 +253,11 @@ class Proposal(NamedTuple):
     """Which units are guesses, and which columns it passes over; empty where there are none."""
 
 
-class _Meant(NamedTuple):
-    """A column that a proposal names."""
-
-    theirs: str
-    """Its name in the file, as `--columns` has it."""
-    name: str
-    unit: str
-    """Empty where the header says it."""
-    unsure: bool
-    """Whether the unit is a guess."""
-    standing: bool
-    """Whether the header says all of it."""
+# A column's name in the file, as `--columns` has it, and what it is; its unit is empty where the header says it.
+_Meant = tuple[str, Guess]
 
 
-def proposal(
-    heads: Sequence[str],
-    names: Names | None = None,
-    cells: Sequence[Cells] = (),
-    tendon_offset: float = TENDON_OFFSET,
-) -> Proposal:
+def proposal(heads: Sequence[str], names: Names, cells: Sequence[Cells], tendon_offset: float) -> Proposal:
     """The text for `--columns` that columns may be meant by, from their names and units, and from their numbers' range.
 
     Parameters
@@ -288,23 +271,24 @@ def proposal(
     tendon_offset
         Distance of the tendons from the axis [m], for the same.
     """
-    columns = _meant(heads, dict(names or {}))
+    columns = _meant(heads, names)
     by_range = _units_by_range(heads, columns, cells, tendon_offset) if cells else {}
     entries, guessed, ranged = list[str](), list[str](), list[str]()
     count = ""
     for place, column in enumerate(columns):
-        if column is None or column.standing:
+        if column is None or column[1].standing:
             continue
-        unit = by_range.get(place, column.unit)
-        entry = _entry(column.name, column.theirs, unit)
+        theirs, guess = column
+        unit = by_range.get(place, guess.unit)
+        entry = f"{guess.name}={theirs}{f' [{unit}]' * bool(unit)}"
         if not _reads_back(entry):
             continue
         entries.append(entry)
-        if column.unsure:
-            (ranged if place in by_range else guessed).append(column.theirs)
-            if column.name.startswith("spool_") and place in by_range and unit not in LENGTH:
+        if guess.unsure:
+            (ranged if place in by_range else guessed).append(theirs)
+            if guess.name.startswith("spool_") and place in by_range and unit not in LENGTH:
                 count = f"; {count_told(unit, tendon_offset)}"
-            elif column.name.startswith("spool_") and place not in by_range and unit == "mm":
+            elif guess.name.startswith("spool_") and place not in by_range and unit == "mm":
                 count = count or "; of a counter [0.175 mm] is what one count reels in"
     units = [f"the unit of {', '.join(guessed)}"] * bool(guessed)
     units += [f"by the range of the numbers the unit of {', '.join(ranged)}"] * bool(ranged)
@@ -324,12 +308,12 @@ def _meant(heads: Sequence[str], named: Names) -> list[_Meant | None]:
         key = theirs if theirs in named else head.strip()
         if key in named:
             name, unit = named[key]
-            unsure = not (unit or name in WORDS or _in_header(head, name))
-            columns.append(_Meant(key, name, unit or _first_unit(name) * unsure, unsure, False))
-        elif (guess := guess_of[head]) is None:
-            columns.append(None)
+            in_header = _factor(_parted(head)[1], units_of(name) or {}) is not None
+            unsure = not (unit or name in WORDS or in_header)
+            columns.append((key, Guess(name, unit or _first_unit(name) * unsure, unsure, False)))
         else:
-            columns.append(_Meant(theirs, guess.name, guess.unit, guess.unsure, guess.standing))
+            guess = guess_of[head]
+            columns.append(guess and (theirs, guess))
     return columns
 
 
@@ -341,18 +325,17 @@ def _units_by_range(
     for place, column in enumerate(columns):
         if column is None:
             continue
-        if column.name in BENDS:
+        _, guess = column
+        if guess.name in BENDS:
             numbers = numbers_of(cells[place])
             unit = unit_of_bend(numbers)
-            if column.unsure and unit:
+            if guess.unsure and unit:
                 units[place] = unit
-            match = _HEAD.fullmatch(heads[place])
-            said = column.unit or (match[2] if match else "") or ""
-            factor = _factor(units.get(place, said), ANGLE)
+            factor = _factor(units.get(place, guess.unit or _parted(heads[place])[1]), ANGLE)
             ranges += [factor * range_of(numbers)] if factor else []
-        elif column.name.startswith("spool_") and column.unsure:
+        elif guess.name.startswith("spool_") and guess.unsure:
             spools[place] = numbers_of(cells[place])
-        elif column.name.startswith("current_") and column.unsure:
+        elif guess.name.startswith("current_") and guess.unsure:
             units[place] = unit_of_current(numbers_of(cells[place]))
     unit = unit_of_spools(list(spools.values()), way_of_bend(ranges, tendon_offset))
     return units | dict.fromkeys(spools, unit) if unit else units
@@ -360,8 +343,7 @@ def _units_by_range(
 
 def _known_already(head: str) -> Guess | None:
     """What a column is that an open log has by its name and unit."""
-    match = _HEAD.fullmatch(head)
-    written, unit = (match[1], match[2] or "") if match else (head.strip(), "")
+    written, unit = _parted(head)
     name = SYNONYMS.get(written, written)
     units = units_of(name)
     if name in WORDS:
@@ -371,25 +353,12 @@ def _known_already(head: str) -> Guess | None:
     if _factor(unit, units) is not None:
         return Guess(name, unit, False, True)
     spelt = UNIT_WORDS.get(unit.lower(), "")
-    return Guess(name, spelt if spelt in units else next(iter(_first(name))), spelt not in units, False)
-
-
-def _first(name: str) -> Sequence[str]:
-    """Units of a column, the commonest first."""
-    return ("mm",) if units_of(name) is LENGTH else tuple(units_of(name) or ())
+    return Guess(name, spelt if spelt in units else _first_unit(name), spelt not in units, False)
 
 
 def _first_unit(name: str) -> str:
-    return next(iter(_first(name)), "")
-
-
-def _in_header(head: str, name: str) -> bool:
-    match = _HEAD.fullmatch(head)
-    return match is not None and _factor(match[2] or "", units_of(name) or {}) is not None
-
-
-def _entry(name: str, theirs: str, unit: str) -> str:
-    return f"{name}={theirs} [{unit}]" if unit else f"{name}={theirs}"
+    """The commonest unit of a column."""
+    return "mm" if units_of(name) is LENGTH else next(iter(units_of(name) or ()), "")
 
 
 def _reads_back(entry: str) -> bool:

@@ -18,11 +18,11 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import LOG_FORMATS
 from wristctl.errors import UserError, nearest
-from wristctl.plain_files import LARGEST_DATA, open_plain
-from wristctl.records.column_ranges import TENDON_OFFSET
+from wristctl.records.column_ranges import TENDON_OFFSET, numbers_of
 from wristctl.records.log_columns import Units
+from wristctl.records.matlab_vectors import variables_of
 from wristctl.records.open_log import OpenLog, read_table, text_of
-from wristctl.records.parquet_logs import parquet_frame
+from wristctl.records.parquet_logs import data_frame
 from wristctl.records.workbooks import read_sheets
 
 NECK_WINCH = 0.010
@@ -112,15 +112,7 @@ def _arm(file: Path, rows: Sequence[Sequence[Any]], lines: Sequence[int]) -> Ope
 
 def _arm_of_matlab(file: Path) -> OpenLog:
     """Steps ud and tips yd, 3 x T, or tips of the closed loops, yex21 and yex22."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        with open_plain(file, LARGEST_DATA) as stream:
-            content = loadmat(stream)  # type: ignore[arg-type]  # its documentation has files too
-    except (OSError, ValueError, NotImplementedError, MatReadError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise UserError(f"cannot read the file of MATLAB: {reason}", str(file), "check the path") from error
+    content = variables_of(file, "file of MATLAB")
     if "ud" in content and "yd" in content:
         rows = np.concatenate([content["ud"], content["yd"]]).T
         return _arm(file, rows.tolist(), range(1, 1 + len(rows)))
@@ -145,7 +137,7 @@ def _tee_probe(file: Path) -> OpenLog:
         if names is None:
             continue
         kept = [(number, row) for number, row in enumerate(rows, 2) if row[names[0]].strip()]
-        values = np.array([[_cell(row[place]) for place in names] for _, row in kept]).reshape(-1, len(names))
+        values = np.stack([numbers_of([row[place] for _, row in kept]) for place in names], axis=1)
         turned = [(part != 0.0).any(axis=1) for part in (values[:, 1:5], values[:, 5:9])]  # zeros: a lost sensor
         whole = np.isfinite(values).all(axis=1) & turned[0] & turned[1]
         values, kept = values[whole], [row for row, there in zip(kept, whole, strict=True) if there]
@@ -162,14 +154,6 @@ def _tee_probe(file: Path) -> OpenLog:
         raise UserError(problem, str(file), "a workbook of TEE-Probe_hysteresis_id")
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return OpenLog(file, "recording of the probe", columns, {"trial": np.array(words)}, {}, lines)
-
-
-def _cell(text: str) -> float:
-    """The number in a cell of a workbook; nan where there is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def _probe_columns(heads: Sequence[str]) -> list[int] | None:
@@ -201,17 +185,7 @@ def _turned(steps: Array, tip: Array, base: Array) -> Array:
 
 def _spirob(file: Path) -> OpenLog:
     """Measured forces and lengths of two antagonists, and the sum of the joints' angles as the bend."""
-    import pandas as pd
-
-    if file.suffix != ".csv":
-        frame = parquet_frame(file, "recording")
-    else:
-        try:
-            with open_plain(file, LARGEST_DATA) as stream:
-                frame = pd.read_csv(stream)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise UserError(f"cannot read the recording: {reason}", str(file), "check the path") from error
+    frame = data_frame(file, "recording")
     return spirob_log(file, {str(name): column.to_numpy() for name, column in frame.items()})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,14 +30,14 @@ def jumps_told(log: OpenLog) -> list[str]:
     """
     told = list[str]()
     for trial in log.trials().values():
-        spools = [name for name in trial.columns if name.startswith("spool_")]
-        time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
+        spools, time = [name for name in trial.columns if name.startswith("spool_")], trial.time
         for name in spools:
             there = np.flatnonzero(np.isfinite(trial.columns[name]))
             values = trial.columns[name][there]
             jumps, without = _without_jumps(values)
             others = [other for other in (*_MOTION, *spools) if other in trial.columns and other != name]
-            rest = _whole_at(time[there], [(time, trial.columns[other]) for other in others])
+            known = [(trial.columns[other], np.isfinite(trial.columns[other])) for other in others]
+            rest = np.array([np.interp(time[there], time[at], x[at]) for x, at in known if at.any()]).T
             if not jumps.size or not rest.size:
                 continue
             left, better = _left(values, rest), _left(without, rest)
@@ -50,7 +49,7 @@ def jumps_told(log: OpenLog) -> list[str]:
             fix = "a counter that wraps (at an encoder's turn), or lost steps? Mend it in the file"
             if better < _SURELY * left:
                 raise UserError(problem, place, fix)
-            told.append(f"{Path(place).name}: {problem}. Is it {fix[0].lower()}{fix[1:]}.")
+            told.append(f"{Path(place).name}: {problem}. Is it {fix}.")
     return told
 
 
@@ -65,7 +64,7 @@ def lone_cells(log: OpenLog, name: str) -> list[str]:
     if not found:
         return []
     lines = ", ".join(map(str, found[:3])) + (", ..." if len(found) > 3 else "")
-    where = f"{Path(log.file).name}:{lines}"
+    where = f"{log.file.name}:{lines}"
     cells = "a cell stands" if len(found) == 1 else f"{len(found)} cells stand"
     return [f"{where}: {cells} alone in {log.head(name)}, far from the rows before and after; leave such cells empty."]
 
@@ -94,12 +93,6 @@ def _without_jumps(values: Array) -> tuple[Rows, Array]:
     mended = steps.copy()
     mended[jumps] = np.interp(jumps, calm, steps[calm])
     return jumps + 1, np.concatenate([values[:1], values[0] + np.cumsum(mended)])
-
-
-def _whole_at(time: Array, columns: Sequence[tuple[Array, Array]]) -> Array:
-    """Columns (T, C) at some times, by lines between the cells that they have; those without any are left out."""
-    known = [(clock[np.isfinite(column)], column[np.isfinite(column)]) for clock, column in columns]
-    return np.array([np.interp(time, clock, column) for clock, column in known if len(column)]).T
 
 
 def _left(values: Array, rest: Array) -> float:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.errors import Argument, Phrase, UserError
@@ -24,11 +23,10 @@ from wristctl.records.column_ranges import (
     way_of_bend,
 )
 from wristctl.records.log_columns import ANGLE, BENDS, LENGTH, Units, units_of
-from wristctl.records.log_counters import without_wraps
 from wristctl.records.log_jumps import jumps_told
-from wristctl.records.log_order import in_order, parted, place_of, without_repeats
+from wristctl.records.log_mending import in_order, parted, without_repeats, without_wraps
 from wristctl.records.log_sensors import sensors_told
-from wristctl.records.open_log import OpenLog
+from wristctl.records.open_log import OpenLog, filled
 
 _log = logging.getLogger(__name__)
 
@@ -79,28 +77,24 @@ def looked_at(log: OpenLog, motion: bool = True, tendon_offset: float | None = N
 
 
 def _check_units(log: OpenLog, tendon_offset: float) -> None:
-    for name in BENDS:
-        column = np.abs(log.columns.get(name, np.empty(0)))
-        if np.any(column > _BEND):
-            reached, where = math.degrees(float(np.nanmax(column))), log.at(int(np.nanargmax(column)))
-            fix = columns_fix(log, "is it in degrees?", {name: (log.head(name), "deg")})
-            raise UserError(f"{log.head(name)} reaches {reached:,.0f} deg by its header", where, fix)
-    for name, column in _tendons(log, "spool").items():
+    in_mn = "is it in mN, or a current in mA with a factor for A? [0.001 N] is a thousandth"
+    for names, most, shown, question, other in (
+        (BENDS, _BEND, (1.0 / ANGLE["deg"], "deg"), "is it in degrees?", "deg"),
+        (log.known("tension"), _TENSION, (1.0, "N"), in_mn, ""),
+        (log.known("current"), _CURRENT, (1.0, "A"), "is it in mA?", "mA"),
+    ):
+        for name in names:
+            column = np.abs(log.columns.get(name, np.empty(0)))
+            if np.any(column > most):
+                fix = columns_fix(log, question, {name: (log.head(name), other)}) if other else question
+                problem = f"{log.head(name)} reaches {shown[0] * np.nanmax(column):,.0f} {shown[1]} by its header"
+                raise UserError(problem, log.at(int(np.nanargmax(column))), fix)
+    for name, column in log.known("spool").items():
         reach = float(np.nanmax(column) - np.nanmin(column))
         if reach > _SPOOL:
             where = log.at(int(np.nanargmax(np.abs(column))))
             fix = _of_other_units(log, tendon_offset)
             raise UserError(f"{log.head(name)} moves {reach:,.3g} m by its header", where, fix)
-    for name, column in _tendons(log, "tension").items():
-        if float(np.nanmax(np.abs(column))) > _TENSION:
-            problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} N by its header"
-            fix = "is it in mN, or a current in mA with a factor for A? [0.001 N] is a thousandth"
-            raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
-    for name, column in _tendons(log, "current").items():
-        if float(np.nanmax(np.abs(column))) > _CURRENT:
-            problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} A by its header"
-            fix = columns_fix(log, "is it in mA?", {name: (log.head(name), "mA")})
-            raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
     for trial in log.trials().values():
         steps = np.diff(trial.columns.get("time", np.empty(0)))
         slow = steps.size > 0 and float(np.min(steps)) > _STEP and float(np.sum(steps)) > _LONG
@@ -111,7 +105,7 @@ def _check_units(log: OpenLog, tendon_offset: float) -> None:
 
 def _check_ways(log: OpenLog, tendon_offset: float) -> None:
     """Refuse spools that go much further, or less far, than the bend takes."""
-    spools = [name for name in _tendons(log, "spool") if name in log.scales]
+    spools = [name for name in log.known("spool") if name in log.scales]
     if not spools:
         return
     furthest = max(spools, key=lambda name: np.nan_to_num(_range(log, name)))
@@ -137,7 +131,7 @@ def _in_mm(length: float) -> str:
 
 def _of_other_units(log: OpenLog, tendon_offset: float) -> Phrase:
     """Units of spools, and of bends, with which the spools go as far as the bend takes; without a bend mm for m."""
-    spools = [name for name in _tendons(log, "spool") if name in log.scales]
+    spools = [name for name in log.known("spool") if name in log.scales]
     if not spools:
         return "its unit in the header"
     in_rad = {name: (log.head(name), "rad") for name in BENDS if _is_in_rad(log, name)}
@@ -148,7 +142,7 @@ def _of_other_units(log: OpenLog, tendon_offset: float) -> Phrase:
     if in_deg and way > 0.0 and moves and not _is_off(max(moves.values()), way * ANGLE["deg"], 1.0, _NEARLY):
         return columns_fix(log, f"is {log.head(next(iter(in_deg)))} in deg?", in_deg)
     if not (way > 0.0 and moves):
-        moved = max(float(np.nanmax(column) - np.nanmin(column)) for column in _tendons(log, "spool").values())
+        moved = max(float(np.nanmax(column) - np.nanmin(column)) for column in log.known("spool").values())
         if all(log.scales[name] == 1.0 for name in spools) and 1e-3 * moved < _SPOOL:
             return columns_fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in spools})
         most = count_of(_SPOOL / moved * abs(log.scales[spools[0]]))
@@ -191,7 +185,7 @@ def _is_in_rad(log: OpenLog, name: str) -> bool:
 
 
 def _check_spools(log: OpenLog, motion: bool) -> None:
-    spools = _tendons(log, "spool")
+    spools = log.known("spool")
     still = all(float(np.nanmax(spool) - np.nanmin(spool)) == 0.0 for spool in spools.values())
     if motion and spools and len(log) > 1 and still:
         problem = "no spool moves: nothing can be identified from a log without motion"
@@ -226,15 +220,14 @@ def _jumps(trial: OpenLog, names: Sequence[str]) -> dict[str, Array]:
 
 def _check_senses(log: OpenLog) -> None:
     pulls = next(
-        (pulls for kind in ("spool", "tension") if list(pulls := _tendons(log, kind)) == [f"{kind}_1", f"{kind}_2"]), {}
+        (pulls for kind in ("spool", "tension") if list(pulls := log.known(kind)) == [f"{kind}_1", f"{kind}_2"]), {}
     )
     if not pulls or "bend_y" not in log.columns or "bend_z" in log.columns:
         return
     one, two = pulls
     for name, trial in {"": log, **log.trials()}.items():
-        time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
         bend = trial.columns["bend_y"]
-        reeled = [_at_all(time, trial.columns[pull]) for pull in pulls]
+        reeled = [filled(trial.time, trial.columns[pull]) for pull in pulls]
         there = np.isfinite(np.stack([bend, *reeled])).all(axis=0)
         bend, first, second = (column[there] for column in (bend, *reeled))
         within = f" in trial {name}" if name else ""
@@ -269,7 +262,7 @@ def _slow_clock(log: OpenLog) -> list[str]:
     if not (whole and float(np.median(steps)) > _SLOW and float(np.sum(steps)) > _LONG):
         return []
     return [
-        f"{place_of(log, 0)}: {log.head('time')} has rows {float(np.median(steps)):.3g} s apart over "
+        f"{log.place(0)}: {log.head('time')} has rows {float(np.median(steps)):.3g} s apart over "
         f"{float(np.sum(steps)) / 3600.0:.3g} h; is it in ms? Delay and damping go with it."
     ]
 
@@ -311,7 +304,7 @@ def _gaps(log: OpenLog) -> list[str]:
             steps = np.diff(trial.columns["time"])
             usual = float(np.median(steps)) if steps.size else 0.0
             gaps = np.flatnonzero(steps > max(_GAP * usual, _PAUSE))
-            found += [(place_of(trial, int(row) + 1), float(steps[row]), usual) for row in gaps]
+            found += [(trial.place(int(row) + 1), float(steps[row]), usual) for row in gaps]
     if not found:
         return []
     where, gap, usual = found[0]
@@ -324,7 +317,7 @@ def _gaps(log: OpenLog) -> list[str]:
 
 def _zeros(log: OpenLog) -> list[str]:
     """A sentence where all tendons are reeled in by more than any wrist takes: their encoders have another zero."""
-    spools = _tendons(log, "spool")
+    spools = log.known("spool")
     if len(spools) < 2:
         return []
     together = float(np.mean([np.nanmean(spool) for spool in spools.values()]))
@@ -332,22 +325,6 @@ def _zeros(log: OpenLog) -> list[str]:
         return []
     names = ", ".join(log.head(name) for name in spools)
     return [
-        f"{place_of(log, 0)}: {names} are reeled in by {1e3 * together:.3g} mm in the mean; a spool counts from where "
+        f"{log.place(0)}: {names} are reeled in by {1e3 * together:.3g} mm in the mean; a spool counts from where "
         "its tendon is just taut: slack and tendon stiffness are wrong unless you take that off in the file."
     ]
-
-
-def _tendons(log: OpenLog, quantity: str) -> dict[str, Array]:
-    """Columns of tendons that hold a number, by their names in the order of the tendons."""
-    names = sorted(
-        (name for name in log.columns if name.startswith(f"{quantity}_")), key=lambda name: (len(name), name)
-    )
-    return {name: log.columns[name] for name in names if np.isfinite(log.columns[name]).any()}
-
-
-def _at_all(time: Array, column: Array) -> Array:
-    """A column at all times, by lines between the cells that it has; nan of one without any."""
-    there: NDArray[np.bool_] = np.isfinite(column)
-    if there.all() or not there.any():
-        return column
-    return np.interp(time, time[there], column[there], np.nan, np.nan)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.records.log_jumps import lone_cells
-from wristctl.records.open_log import OpenLog
+from wristctl.records.open_log import OpenLog, filled
 
 # Median of the absolute value of a normal variable, over its standard deviation; scatter [m] of a spool from which it
 # is noise, and least ratio of its fifth to its third differences.
@@ -62,12 +62,12 @@ def sensors_told(log: OpenLog) -> list[str]:
         told += lone_cells(log, column) if column.startswith(_SEEN) else []
     for trial in log.trials().values() if name else ():
         spools = [column for column in trial.columns if column.startswith("spool_")]
-        time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
+        time = trial.time
         assert name is not None
         seen = np.flatnonzero(np.isfinite(trial.columns[name]))
         if len(seen) < 2 * _ROWS or not spools or np.ptp(trial.columns[name][seen]) == 0.0:
             continue
-        reeled = np.stack([_at(time, trial.columns[spool], seen) for spool in spools], axis=1)
+        reeled = np.stack([filled(time, trial.columns[spool])[seen] for spool in spools], axis=1)
         whole = np.isfinite(reeled).all(axis=1)
         seen, reeled = seen[whole], reeled[whole]
         if len(seen) < 2 * _ROWS or not np.ptp(reeled, axis=0).any():
@@ -90,17 +90,6 @@ def sensors_told(log: OpenLog) -> list[str]:
         if "time" in trial.columns:
             told += _late(trial, name, time[seen], motion, reeled)
     return list(dict.fromkeys(told))[:6]
-
-
-def _at(time: Array, column: Array, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Array:
-    """A column at the times of some rows, by lines between the cells that it has."""
-    there = np.isfinite(column)
-    if there.all():
-        values: Array = column[rows]
-        return values
-    if not there.any():
-        return np.full(len(rows), np.nan)
-    return np.interp(time[rows], time[there], column[there], np.nan, np.nan)
 
 
 def _made_of(reeled: Array, motion: Array) -> Array:
@@ -142,9 +131,9 @@ def _standing(column: Array, rest: Array, others: Array | None = None) -> list[_
         to_end = ends or catches_up or steps[run.last] > _MOVED * np.ptp(column)
         long = way > _MOVED and to_end and run.last - run.first + 1 >= _ROWS
         short = way > _MOVED_A_LITTLE and catches_up
-        alone = (way > 0.5 * _MOVED or (way > _MOVED_A_LITTLE and _jumps_after(steps, run))) and _moves_elsewhere(
-            steps, run
-        )
+        stands_elsewhere = float(np.mean(np.delete(steps, np.arange(run.first, run.last)) == 0.0)) >= _NEVER
+        far = way > 0.5 * _MOVED or (way > _MOVED_A_LITTLE and _jumps_after(steps, run))
+        alone = far and not stands_elsewhere
         if long or short or alone:
             found.append(run)
     return found
@@ -154,11 +143,6 @@ def _jumps_after(steps: Array, run: _Run) -> bool:
     """Whether a step at the end of a run is far larger than those before it and after it."""
     near = np.concatenate([steps[max(0, run.first - _ROWS) : max(0, run.first - 1)], steps[run.last + 1 :][:_ROWS]])
     return run.last < len(steps) and bool(steps[run.last] > _CATCHES_UP * float(np.max(near, initial=0.0)))
-
-
-def _moves_elsewhere(steps: Array, run: _Run) -> bool:
-    """Whether a column with such steps stands hardly ever beside a run."""
-    return float(np.mean(np.delete(steps, np.arange(run.first, run.last)) == 0.0)) < _NEVER
 
 
 def _at_ends(motion: Array, made: Array) -> list[_Run]:
@@ -173,12 +157,10 @@ def _turns_within(made: Array, run: _Run) -> bool:
     return _moved(made, run) > _BEYOND and abs(within[0] - within[-1]) < 0.5 * float(np.ptp(within))
 
 
-def _sentence(
-    log: OpenLog, name: str, rows: np.ndarray[tuple[int], np.dtype[np.intp]], runs: list[_Run], what: str
-) -> list[str]:
+def _sentence(log: OpenLog, name: str, rows: NDArray[np.intp], runs: list[_Run], what: str) -> list[str]:
     if not runs:
         return []
-    first, last = (Path(log.at(int(rows[row]))).name for row in runs[0])
+    first, last = (log.place(int(rows[row])) for row in runs[0])
     scale = log.scales.get(name, 1.0)
     value = f"{log.columns[name][rows[runs[0].first]] / scale:.4g}"
     more = f", and {len(runs) - 1} times more" if len(runs) > 1 else ""
@@ -188,7 +170,7 @@ def _sentence(
     ]
 
 
-def _motion_of(log: OpenLog, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Array:
+def _motion_of(log: OpenLog, rows: NDArray[np.intp]) -> Array:
     """Bends, or the tip's way, at some rows (T, 2 or 3); of what is not measured nothing."""
     bends = log.bends()
     tips = [log.columns[name] for name in ("tip_x", "tip_y", "tip_z") if name in log.columns]
@@ -216,10 +198,9 @@ def _rough(log: OpenLog, spools: list[str]) -> list[str]:
     if not sizes:
         return []
     names = ", ".join(log.head(spool) for spool in sizes)
-    where = Path(log.header or str(log.file)).name
     return [
-        f"{where}: {names} scatter by {1e3 * max(sizes.values()):.2g} mm from row to row, as noise does; a fit takes "
-        "that as pulls, and tendons as softer than they are."
+        f"{log.place()}: {names} scatter by {1e3 * max(sizes.values()):.2g} mm from row to row, as noise does; a fit "
+        "takes that as pulls, and tendons as softer than they are."
     ]
 
 
@@ -232,7 +213,7 @@ def _apart(log: OpenLog, spools: list[str], reeled: Array, motion: Array) -> lis
     if said.max() < _GOES:
         return []
     other, furthest = log.head(spools[int(said.argmax())]), log.head(spools[int(ways.argmax())])
-    where, told = Path(log.header or str(log.file)).name, list[str]()
+    where, told = log.place(), list[str]()
     for spool, share, way, own in zip(spools, said, ways, left.T, strict=True):
         rough = float(own[1:] @ own[:-1]) < _ROUGH * float(own @ own)
         if share < _GOES_NOT and way > _LEAST_WAY * ways.max() and rough:
@@ -273,8 +254,7 @@ def _late(log: OpenLog, name: str, time: Array, motion: Array, reeled: Array) ->
         if late > 0.0
         else "no wrist does so: are both of one clock?"
     )
-    where = Path(log.header or str(log.file)).name
-    return [f"{where}: {log.head(name)} is {abs(late):.2g} s {side} the spools all along; {cause}"]
+    return [f"{log.place()}: {log.head(name)} is {abs(late):.2g} s {side} the spools all along; {cause}"]
 
 
 def _likeness(motion: Array, reeled: Array, lag: int) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.errors import UserError
+from wristctl.records.recorded_table import line_of
 
 MISSING = ("", "-", "nan", "NaN", "NA", "null")
 """Cells that hold nothing."""
@@ -76,7 +77,7 @@ def seconds_of(
     scale = factor if math.isnan(scale) else scale
     if float(begin) * scale > _LATEST:
         problem = f"{head} begins {float(begin) * scale:.3g} s after 1970 by its header"
-        raise UserError(problem, f"{file}:{lines[0]}" if lines else str(file), f"is it in {unit}?")
+        raise UserError(problem, line_of(file, lines, 0), f"is it in {unit}?")
     seconds = np.where(there, (numbers - begin).astype(np.float64) * scale, math.nan)
     date = np.datetime64(int(float(begin) * scale * 1e3), "ms")
     return seconds, f"{file.name}: {head} has Unix times{told}; seconds count from the first row, {date}Z."
@@ -105,7 +106,7 @@ def _dates(texts: Sequence[str], head: str, file: Path, lines: Sequence[int]) ->
     dates = pd.to_datetime(pd.Series(written, dtype=object), format="ISO8601", utc=True, errors="coerce")
     wrong = [place for place, text in enumerate(written) if text is not None and pd.isna(dates.iloc[place])]
     if wrong:
-        where = f"{file}:{lines[wrong[0]]}" if lines else str(file)
+        where = line_of(file, lines, wrong[0])
         raise UserError(f"{head} is {texts[wrong[0]]!r}", where, "a date as 2026-11-27T10:00:00.000")
     return dates.dt.tz_localize(None).to_numpy("datetime64[ns]")
 
@@ -131,7 +132,7 @@ def _of_day(texts: Sequence[str], head: str, file: Path, lines: Sequence[int]) -
         if text in MISSING:
             continue
         if not _OF_DAY.fullmatch(text):
-            where = f"{file}:{lines[place]}" if lines else str(file)
+            where = line_of(file, lines, place)
             raise UserError(f"{head} is {text!r}", where, "a time of the day as 10:00:00.000")
         hours, minutes, rest = text.replace(",", ".").split(":")
         clock[place] = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)

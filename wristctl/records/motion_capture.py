@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_columns import ANGLE, LENGTH
-from wristctl.records.recorded_table import LogFormat, RecordedTable, RigidBody
+from wristctl.records.recorded_table import LogFormat, RecordedTable, RigidBody, unit_quaternions
 from wristctl.records.table_text import cells_of
 
 _LENGTHS = {"meters": 1.0, "centimeters": 1e-2, "millimeters": 1e-3, **LENGTH}
@@ -49,8 +49,9 @@ def motive_table(text: str, file: Path) -> RecordedTable:
     names = above[above.index(kinds) + 1] if kinds and kinds is not above[-1] else []
     grid = _numbers(rows[begin + 1 :], len(rows[begin][1]), file)
     head = rows[begin][1]
-    time = _column(grid, head, "Time (Seconds)")
-    if time is None:
+    if "Time (Seconds)" in head:
+        time = grid.numbers[:, head.index("Time (Seconds)")]
+    else:
         time = grid.numbers[:, 0] / _rate(about.get("Export Frame Rate", about.get("Capture Frame Rate", "")), file, 1)
     places = dict[str, dict[str, int]]()
     for place, (kind, name, part, axis) in enumerate(zip(kinds, names, what, head, strict=False)):
@@ -271,10 +272,6 @@ def _rate(text: str, file: Path, line: int) -> float:
     return float(text)
 
 
-def _column(grid: _Grid, head: Sequence[str], name: str) -> Array | None:
-    return grid.numbers[:, list(head).index(name)] if name in head else None
-
-
 def _part(grid: _Grid, at: Mapping[str, int], names: Sequence[str]) -> Array | None:
     return grid.numbers[:, [at[name] for name in names]] if all(name in at for name in names) else None
 
@@ -291,10 +288,7 @@ def _of_angles(angles: Array, order: str, file: Path) -> Array:
 
 
 def _body(time: Array, turn: Array, place: Array | None) -> RigidBody:
-    size = np.linalg.norm(turn, axis=1, keepdims=True)
-    return RigidBody(
-        time, np.where(size > 0.5, turn / np.where(size > 0.5, size, 1.0), np.nan), place, np.arange(len(time))
-    )
+    return RigidBody(time, unit_quaternions(turn), place, np.arange(len(time)))
 
 
 def _table(

@@ -12,6 +12,7 @@ import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -23,7 +24,8 @@ from wristctl.config.choices import LOG_FORMATS
 from wristctl.errors import OUT, Phrase, UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.records.column_ranges import TENDON_OFFSET
-from wristctl.records.files import replacing, sha256_of
+from wristctl.records.files import sha256_of
+from wristctl.records.formats import write_table
 from wristctl.records.inertial_units import bends_of_unit
 from wristctl.records.log_columns import (
     COLUMNS,
@@ -37,6 +39,7 @@ from wristctl.records.log_columns import (
     entries_of,
     mapped_names,
     name_of,
+    proposal,
     units_in_a_line,
     units_of,
 )
@@ -44,7 +47,7 @@ from wristctl.records.log_times import MISSING, is_dated, is_unix, seconds_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.matlab_vectors import vectors_of
 from wristctl.records.parquet_logs import parquet_table
-from wristctl.records.recorded_table import Cells, RecordedTable
+from wristctl.records.recorded_table import Cells, RecordedTable, line_of
 from wristctl.records.rigid_bodies import KEYS, BodyNames, bends_of_bodies
 from wristctl.records.ros_bags import SUFFIXES, bag_table
 from wristctl.records.run import Run
@@ -82,9 +85,18 @@ class OpenLog:
     def __len__(self) -> int:
         return next((len(column) for column in (*self.columns.values(), *self.words.values())), 0)
 
+    @property
+    def time(self) -> Array:
+        """Times (T,) [s]; of a log without any the numbers of its samples."""
+        return self.columns["time"] if "time" in self.columns else np.arange(len(self), dtype=np.float64)
+
     def at(self, sample: int) -> str:
         """File and line of a sample, for messages."""
-        return f"{self.file}:{self.lines[sample]}" if self.lines else str(self.file)
+        return line_of(self.file, self.lines, sample)
+
+    def place(self, sample: int | None = None) -> str:
+        """File's name and line of a sample, or of the header, for sentences."""
+        return Path((self.header or str(self.file)) if sample is None else self.at(sample)).name
 
     def without_gaps(self, name: str) -> Array:
         """A column that is there, without empty cells. Raises UserError where it has one."""
@@ -107,9 +119,12 @@ class OpenLog:
 
     def tendons(self, quantity: str) -> dict[int, Array]:
         """Columns of all tendons' spools [m] or tensions [N] by the tendons' numbers; empty where there are none."""
-        numbers = sorted(int(match[2]) for name in self.columns if (match := TENDON.fullmatch(name)))
-        names = {number: f"{quantity}_{number}" for number in numbers}
-        return {number: self.whole(name) for number, name in names.items() if name in self.columns}
+        return {number: self.whole(f"{quantity}_{number}") for number in self.tendons_of(quantity)}
+
+    def known(self, quantity: str) -> dict[str, Array]:
+        """Columns of tendons that hold a number, by their names in the order of the tendons."""
+        columns = {name: self.columns[name] for name in (f"{quantity}_{k}" for k in self.tendons_of(quantity))}
+        return {name: column for name, column in columns.items() if np.isfinite(column).any()}
 
     def tendons_of(self, quantity: str) -> list[int]:
         """Numbers of the tendons whose spools, tensions or currents are in the log, sorted."""
@@ -135,12 +150,20 @@ class OpenLog:
             return {"": self}
         return {str(name): self.only(self.words["trial"] == name) for name in dict.fromkeys(self.words["trial"])}
 
-    def only(self, samples: NDArray[np.bool_]) -> OpenLog:
-        """The log with some of its samples."""
+    def only(self, samples: NDArray[np.bool_] | NDArray[np.intp]) -> OpenLog:
+        """The log with some of its samples, or with all in another order."""
         columns = {name: column[samples] for name, column in self.columns.items()}
         words = {name: column[samples] for name, column in self.words.items()}
         lines = np.asarray(self.lines)[samples].tolist() if self.lines else ()
         return replace(self, columns=columns, words=words, lines=lines)
+
+
+def filled(time: Array, column: Array) -> Array:
+    """A column (T,) at all times, by lines between the cells that it has; nan before its first and after its last."""
+    there = np.isfinite(column)
+    if there.all() or not there.any():
+        return column
+    return np.interp(time, time[there], column[there], np.nan, np.nan)
 
 
 def read_table(
@@ -207,7 +230,8 @@ def _named(
     where = f"{file}:{table.header_line}" if table.header_line else str(file)
     dated = [place for place, cells in enumerate(table.cells) if is_dated(cells)]
     units = {**COLUMNS, **(more or {})}
-    chosen = chosen_columns(table.heads, names, units, others, dated, where, table.cells, tendon_offset)
+    proposed = partial(proposal, table.heads, names, table.cells, tendon_offset)
+    chosen = chosen_columns(table.heads, names, units, others, dated, where, proposed)
     lengths = {table.heads[place]: len(table.cells[place]) for place in chosen}
     if len(set(lengths.values())) > 1:
         problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
@@ -237,11 +261,7 @@ def _is_date(cells: Cells, scale: float) -> bool:
 
 
 def _text_table(text: str, file: Path, what: str) -> RecordedTable:
-    table = table_of(text, file, units_in_a_line(), EXAMPLE)
-    if table is None:
-        raise UserError(f"the {what} is empty", str(file), f"a header such as {EXAMPLE}, samples below")
-    cells = [[row[place] for row in table.rows] for place in range(len(table.heads))]
-    return RecordedTable(table.heads, cells, table.lines, table.header_line, table.remarks)
+    return table_of(text, file, units_in_a_line(), EXAMPLE, what)
 
 
 def _matlab_table(file: Path, what: str) -> RecordedTable:
@@ -277,14 +297,10 @@ def _numbers(cells: Cells, head: str, file: Path, lines: Sequence[int]) -> Array
     try:
         values: Array = np.array(cells, dtype=np.float64) if len(cells) else np.empty(0)
     except ValueError:
-        values = np.array([_number(str(cell), head, _at(file, lines, row)) for row, cell in enumerate(cells)])
+        values = np.array([_number(str(cell), head, line_of(file, lines, row)) for row, cell in enumerate(cells)])
     if (endless := np.flatnonzero(np.isinf(values))).size:
-        _number(str(cells[endless[0]]), head, _at(file, lines, int(endless[0])))
+        _number(str(cells[endless[0]]), head, line_of(file, lines, int(endless[0])))
     return values
-
-
-def _at(file: Path, lines: Sequence[int], row: int) -> str:
-    return f"{file}:{lines[row]}" if lines else str(file)
 
 
 def _number(cell: str, head: str, where: str) -> float:
@@ -338,9 +354,4 @@ def write_log(log: OpenLog, file: Path, by: Phrase = OUT) -> None:
     `by` is the argument that names another place, where this one cannot be written.
     """
     units = {name: next(unit for unit, scale in (units_of(name) or {}).items() if scale == 1.0) for name in log.columns}
-    heads = [*(f"{name} [{units[name]}]" for name in log.columns), *log.words]
-    columns = [*(column.tolist() for column in log.columns.values()), *(words.tolist() for words in log.words.values())]
-    with replacing(file, by) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(heads)
-        writer.writerows([None if cell != cell else cell for cell in row] for row in zip(*columns, strict=True))
+    write_table(file, {f"{name} [{units[name]}]": column for name, column in log.columns.items()} | {**log.words}, by)

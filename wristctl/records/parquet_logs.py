@@ -19,7 +19,7 @@ from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain, read_json
 from wristctl.records.folders_of_logs import info_of
 from wristctl.records.log_columns import head_of_open_log
-from wristctl.records.recorded_table import INSTALL, Cells, RecordedTable
+from wristctl.records.recorded_table import INSTALL, Cells, RecordedTable, cannot_read
 
 STATE, ACTION = "observation.state", "action"
 OBSERVED, OBSERVED_AT = "observed", "observed_at"
@@ -32,7 +32,7 @@ def parquet_table(file: Path, what: str) -> RecordedTable:
 
     Raises UserError for a file that cannot be read.
     """
-    frame = parquet_frame(file, what)
+    frame = data_frame(file, what)
     info = info_of(file)
     names = _names(info) if info else {}
     if {"frame_index", "index"} <= set(frame):
@@ -91,18 +91,17 @@ def _samples(
     return RecordedTable(["trial", "time [s]", *heads], [trial, every[:, 1], *columns], others=True)
 
 
-def parquet_frame(file: Path, what: str) -> Any:
-    """Data frame of a parquet file. Raises UserError for one that cannot be read."""
+def data_frame(file: Path, what: str) -> Any:
+    """Data frame of a parquet or a CSV file. Raises UserError for one that cannot be read."""
     import pandas as pd
 
     try:
         with open_plain(file, LARGEST_DATA) as stream:
-            return pd.read_parquet(stream)
+            return pd.read_csv(stream) if file.suffix == ".csv" else pd.read_parquet(stream)
     except ImportError:
         raise UserError("parquet files are read by pyarrow, which is not installed", str(file), INSTALL) from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise UserError(f"cannot read the {what}: {reason}", str(file), "check the path") from error
+        raise cannot_read(what, file, error) from error
 
 
 def _plain(series: Any) -> np.ndarray[Any, Any]:

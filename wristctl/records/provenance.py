@@ -6,6 +6,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
@@ -84,13 +85,14 @@ def environment_state() -> tuple[Environment, str]:
     versions = [((package["Name"] or "").lower(), package["Version"]) for package in described]
     installed = dict(reversed(versions))  # the first on the path is the one that is imported
     listing = "".join(f"{name}=={version}\n" for name, version in sorted(installed.items()))
+    cpu, features = _processor()
     environment = Environment(
         python=platform.python_version(),
         os=platform.platform(),
         machine=platform.machine(),
-        cpu=_cpu(),
+        cpu=cpu,
         cores=os.cpu_count() or 1,
-        features=_features(),
+        features=features,
         settings={name: os.environ[name] for name in _CODE_PATHS if name in os.environ},
         threads={name: os.environ[name] for name in _THREADS if name in os.environ},
         packages={name: installed[name] for name in _NUMERICAL if name in installed},
@@ -99,22 +101,13 @@ def environment_state() -> tuple[Environment, str]:
     return environment, listing
 
 
-def _cpu() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    return next(
-        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
-        platform.processor(),
-    )
-
-
-def _features() -> list[str]:
-    """The processor's vector instructions: libraries compute by the widest."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return []
-    flags = next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
-    return sorted(flag for flag in flags if flag in ("fma", "asimd", "sve") or flag.startswith(("sse4", "avx")))
+def _processor() -> tuple[str, list[str]]:
+    """The processor's name and vector instructions: libraries compute by the widest."""
+    told = dict[str, str]()
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            key, _, value = line.partition(":")
+            told.setdefault(key.strip(), value.strip())
+    flags = told.get("flags", told.get("Features", "")).split()
+    vector = sorted(flag for flag in flags if flag in ("fma", "asimd", "sve") or flag.startswith(("sse4", "avx")))
+    return told.get("model name", platform.processor()), vector

@@ -11,11 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.errors import UserError
 
 Cells = Sequence[str] | np.ndarray[Any, Any]
 """A column: texts as they stand in the file, or numbers, dates or texts of numpy (T,)."""
 INSTALL = "pip install 'wristctl[logs]'"
 """What installs the libraries that read logs in binary formats."""
+
+
+def cannot_read(what: str, file: Path, error: Exception, fix: str = "check the path") -> UserError:
+    """The user's error of a recording that its reader refuses."""
+    return UserError(f"cannot read the {what}: {getattr(error, 'strerror', None) or error}", str(file), fix)
+
+
+def line_of(file: Path, lines: Sequence[int], row: int) -> str:
+    """File and line of a row, for messages; the file alone of a binary one, which has no lines."""
+    return f"{file}:{lines[row]}" if lines else str(file)
 
 
 @dataclass(frozen=True)
@@ -32,6 +43,12 @@ class RigidBody:
     """Row of the table of each time (T,)."""
     since: int | None = None
     """Row of the table from whose pose the orientation counts; None: from axes of its own."""
+
+
+def unit_quaternions(turn: Array) -> Array:
+    """Quaternions (T, 4) of norm 1; nan where one is no orientation."""
+    size = np.linalg.norm(turn, axis=1, keepdims=True)
+    return np.where(size > 0.5, turn / np.where(size > 0.5, size, 1.0), np.nan)
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,9 @@ def remove(run: Run) -> None:
     It is first renamed, so that no half-deleted run is ever listed; `leftovers` finds what a kill leaves of run and
     tags.
     """
-    hidden = _free(run.path.with_name(f".{run.id}{REMOVED}"))
+    hidden, number = run.path.with_name(f".{run.id}{REMOVED}"), 2
+    while hidden.exists():  # an earlier deletion left something
+        hidden, number = hidden.with_name(f".{run.id}-{number}{REMOVED}"), number + 1
     if run.path.is_symlink():
         run.path.unlink()
     else:
@@ -77,14 +79,6 @@ def _held_by_others(folder: Path) -> Path | None:
         *(subfolder for subfolder in folder.rglob("*") if subfolder.is_dir() and not subfolder.is_symlink()),
     ]
     return next((subfolder for subfolder in folders if not os.access(subfolder, os.W_OK | os.X_OK)), None)
-
-
-def _free(path: Path) -> Path:
-    """The path, or one like it, where an earlier deletion left something."""
-    number = 2
-    while path.exists():
-        path, number = path.with_name(f"{path.name.removesuffix(REMOVED)}-{number}{REMOVED}"), number + 1
-    return path
 
 
 # All that a run may have written before its manifest.

@@ -18,7 +18,7 @@ import numpy as np
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain
 from wristctl.records.log_columns import head_of_open_log
-from wristctl.records.recorded_table import INSTALL, RecordedTable, RigidBody
+from wristctl.records.recorded_table import INSTALL, RecordedTable, RigidBody, cannot_read, unit_quaternions
 
 SUFFIXES = (".mcap", ".db3", ".bag")
 """Endings of files that are bags."""
@@ -26,6 +26,7 @@ SUFFIXES = (".mcap", ".db3", ".bag")
 _NUMBERS = ("Float64", "Float32", "Int32", "Int64", "UInt32", "UInt16", "Int16")
 _VECTORS = ("Float64MultiArray", "Float32MultiArray", "Int32MultiArray")
 _POSES = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Imu")
+_READ = ("JointState", *_NUMBERS, *_VECTORS, *_POSES)
 _NANOSECONDS = 10**9
 TRIAL, BASE_FRAME = "trial", "wrist_base"
 """Topic that names the trial, and frame of poses in the axes of an open log."""
@@ -56,19 +57,15 @@ def bag_table(file: Path, what: str) -> RecordedTable:
         open_plain(file, LARGEST_DATA).close()
         with AnyReader([file], default_typestore=get_typestore(Stores.LATEST)) as reader:
             types = {connection.msgtype for connection in reader.connections}
-            wanted = [
-                one for one in reader.connections if _is_read(one.msgtype) or _names_trial(one.topic, one.msgtype)
-            ]
+            wanted = [one for one in reader.connections if _kind(one) in _READ or _names_trial(one)]
             for connection, recorded, raw in reader.messages(wanted) if wanted else ():
                 message: Any = reader.deserialize(raw, connection.msgtype)
-                if _names_trial(connection.topic, connection.msgtype):
+                if _names_trial(connection):
                     trials[recorded] = message.data
                     continue
-                _note(connection.topic, connection.msgtype.rpartition("/")[2], message, recorded, columns, poses)
+                _note(connection.topic, _kind(connection), message, recorded, columns, poses)
     except Exception as error:  # of a torn file the library's reader fails in any way
-        reason = getattr(error, "strerror", None) or error
-        fix = "a bag of ROS, closed properly (`ros2 bag reindex`)"
-        raise UserError(f"cannot read the {what}: {reason}", str(file), fix) from error
+        raise cannot_read(what, file, error, "a bag of ROS, closed properly (`ros2 bag reindex`)") from error
     if not columns and not poses:
         problem = f"no topic of a type that is read, but {', '.join(sorted(types)) or 'none at all'}"
         raise UserError(
@@ -77,12 +74,13 @@ def bag_table(file: Path, what: str) -> RecordedTable:
     return _table(columns, poses, trials)
 
 
-def _names_trial(topic: str, kind: str) -> bool:
-    return topic.rpartition("/")[2] == TRIAL and kind.endswith("/String")
+def _kind(connection: Any) -> str:
+    """Type of a topic's messages, without its package."""
+    return str(connection.msgtype.rpartition("/")[2])
 
 
-def _is_read(kind: str) -> bool:
-    return kind.rpartition("/")[2] in ("JointState", *_NUMBERS, *_VECTORS, *_POSES)
+def _names_trial(connection: Any) -> bool:
+    return bool(connection.topic.rpartition("/")[2] == TRIAL) and _kind(connection) == "String"
 
 
 def _note(
@@ -162,10 +160,8 @@ def _table(
         rows = np.searchsorted(times, np.array(list(stream_of_poses), np.int64))
         values = np.array(list(stream_of_poses.values()))[np.argsort(rows)]
         rows = np.sort(rows)
-        size = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
-        turn = np.where(size > 0.5, values[:, 3:] / np.where(size > 0.5, size, 1.0), np.nan)
         place = None if np.isnan(values[:, :3]).all() else values[:, :3]
-        bodies[topic] = RigidBody(seconds[rows], turn, place, rows)
+        bodies[topic] = RigidBody(seconds[rows], unit_quaternions(values[:, 3:]), place, rows)
     heads = ["time [s]", *columns]
     if trials:
         begins = sorted(trials)

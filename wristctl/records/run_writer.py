@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
+import os
 import resource
 import shlex
 import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,7 +19,7 @@ from wristctl.errors import UserError, reason_of
 from wristctl.interrupt import asked
 from wristctl.plugins.own_runs import note
 from wristctl.records import formats
-from wristctl.records.files import check_plain, files_below, replacing, sha256_of, sync, write_bytes, write_text
+from wristctl.records.files import check_plain, files_below, sha256_of, sync, write_bytes, write_text
 from wristctl.records.journal import Journal, jsonable, now
 from wristctl.records.manifest import (
     CONFIG,
@@ -40,6 +41,7 @@ from wristctl.records.manifest import (
     TakenOver,
 )
 from wristctl.records.seal import entries, result_hash, write_seal
+from wristctl.seeds import stream
 from wristctl.sha256sums import read_seal
 from wristctl.study_files.keys import command_of
 
@@ -61,7 +63,7 @@ def readme(manifest: Manifest, summary: str) -> str:
             f"\nInput `{record.role}`: {record.kind} run {record.run} (result {record.result_sha256[:12]})."
             for record in manifest.inputs
         ),
-        *([_taken_over(manifest.units)] if manifest.units else []),
+        *([_TAKEN_OVER.format(units=manifest.units)] if manifest.units else []),
         *([f"\nError: {manifest.error.what} {manifest.error.where}".rstrip()] if manifest.error else []),
         *(f"\nNot drawn: {name}: {reason}" for name, reason in manifest.undrawn.items()),
         *(["", "## Result", "", summary.strip()] if summary else []),
@@ -96,10 +98,10 @@ def readme(manifest: Manifest, summary: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _taken_over(units: TakenOver) -> str:
-    """Count of units that a run took over from an earlier run, as text."""
-    text = f"\n{units.taken_over} units of work were computed in run {units.run}, which this one goes on from"
-    return f"{text}; {units.computed_again} more of its units were computed again here, and gave the same."
+_TAKEN_OVER = (
+    "\n{units.taken_over} units of work were computed in run {units.run}, which this one goes on from; "
+    "{units.computed_again} more of its units were computed again here, and gave the same."
+)
 
 
 # Notes what could not be drawn, by its name.
@@ -112,11 +114,6 @@ RESERVE, _RESERVED = ".reserve", 512 * 1024
 _RESULTS = ("data", "models", "figures")
 _PROVENANCE = (CONFIG, PACKAGES, PATCH, SOURCES)
 _RECORDS = {MANIFEST, SUMS, CONFIG, EVENTS, CONSOLE, PACKAGES, PATCH, SOURCES, README, REPORT}
-
-
-def stream(seed: int, name: str) -> tuple[int, int]:
-    """Entropy of the named random stream under a root seed, for `numpy.random.default_rng`."""
-    return seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
 
 
 class LiveRun:
@@ -289,14 +286,10 @@ class LiveRun:
 
     def _still_there(self) -> None:
         """UserError where the folder is no longer the one that the run began with."""
-        try:
-            folder_status = self.path.stat()
-        except OSError:
-            folder_status = None
-        if folder_status is None or (folder_status.st_dev, folder_status.st_ino) != (
-            self._home.st_dev,
-            self._home.st_ino,
-        ):
+        there = False
+        with suppress(OSError):
+            there = os.path.samestat(self.path.stat(), self._home)
+        if not there:
             problem = "the run's folder was removed, moved or replaced while it ran"
             raise UserError(problem, str(self.path), "leave it where it is, and run again")
 
@@ -308,16 +301,11 @@ class LiveRun:
 
     def _nothing_lost(self, outputs: set[str]) -> None:
         """UserError where something that the run has written is gone, or its provenance is another."""
-        lost = sorted(self._handed - outputs)
-        lost += [name for name, digest in self._provenance.items() if not self._is(name, digest)]
+        lost = [self.path / name for name in sorted(self._handed - outputs)]
+        kept = ((self.path / name, digest) for name, digest in self._provenance.items())
+        lost += [path for path, digest in kept if not path.is_file() or sha256_of(path) != digest]
         if lost:
-            raise UserError(
-                "a file of the run was removed or changed while it ran", str(self.path / lost[0]), "run again"
-            )
-
-    def _is(self, name: str, digest: str) -> bool:
-        path = self.path / name
-        return path.is_file() and sha256_of(path) == digest
+            raise UserError("a file of the run was removed or changed while it ran", str(lost[0]), "run again")
 
     def _write_report(self, manifest: Manifest) -> None:
         """report.html, a picture of results that stand: whatever is wrong with it must not cost the run."""
@@ -341,6 +329,4 @@ class LiveRun:
         )
 
     def _write_manifest(self) -> None:
-        with replacing(self.path / MANIFEST) as temporary:
-            text = self._manifest.model_dump_json(by_alias=True, indent=2)
-            temporary.write_text(text + "\n", encoding="utf-8")
+        write_text(self.path / MANIFEST, self._manifest.model_dump_json(by_alias=True, indent=2) + "\n")

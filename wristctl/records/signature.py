@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.errors import Call, UserError
-from wristctl.plain_files import open_plain, read_plain, unreadable
-from wristctl.records.files import write_text
+from wristctl.plain_files import open_plain
+from wristctl.records.files import content_of, write_text
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
 
@@ -40,7 +40,7 @@ def sign(run: Run, key: Path) -> RunSignature:
         open_plain(key).close()  # ssh-keygen would wait for a pipe
     except OSError as error:
         raise UserError(f"cannot sign: {error.strerror}", str(key), _KEY) from error
-    process = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=_content(run.path / SUMS))
+    process = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=content_of(run.path / SUMS))
     if process.returncode != 0:
         raise UserError(f"cannot sign: {_error_text(process)}", str(key), _KEY)
     write_text(run.path / SIGNATURE, process.stdout.decode())
@@ -58,8 +58,8 @@ def signature(run: Run, signers: Path | None) -> RunSignature:
     file = run.path / SIGNATURE
     if not is_signed(run):
         raise UserError("run is not signed", str(run.path), ("ask whoever made it to run `", Call("runs sign"), "`"))
-    content = _content(run.path / SUMS)
-    _content(file)  # ssh-keygen would wait for a pipe
+    content = content_of(run.path / SUMS)
+    content_of(file)  # ssh-keygen would wait for a pipe
     valid = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(file), content=content)
     match = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))
     if valid.returncode != 0 or not match:
@@ -67,7 +67,7 @@ def signature(run: Run, signers: Path | None) -> RunSignature:
     key = match[1]
     if signers is None:
         return RunSignature("", key)
-    _content(signers)
+    content_of(signers)
     names = _ssh_keygen("find-principals", "-s", str(file), "-f", str(signers))
     for name in names.stdout.decode(errors="replace").splitlines():
         options = ("-f", str(signers), "-I", name, "-n", NAMESPACE, "-s", str(file))
@@ -82,13 +82,6 @@ def _ssh_keygen(action: str, *options: str, content: bytes = b"") -> subprocess.
         raise UserError("signatures need OpenSSH", "ssh-keygen", "install openssh-client")
     plain = {**os.environ, "LC_ALL": "C"}
     return subprocess.run([program, "-Y", action, *options], input=content, capture_output=True, env=plain)
-
-
-def _content(file: Path) -> bytes:
-    try:
-        return read_plain(file)
-    except OSError as error:
-        raise unreadable(error, file) from error
 
 
 def _error_text(process: subprocess.CompletedProcess[bytes]) -> str:

@@ -15,8 +15,8 @@ from wristctl.config.foreign import Foreign
 from wristctl.config.study import Study
 from wristctl.errors import OUT, Argument, UserError, error_of_the_system
 from wristctl.interrupt import deferred, interrupts, undisturbed
-from wristctl.records.copied_inputs import SealedFiles, copy_code, sealed_files, sealed_references, write_files
-from wristctl.records.files import replacing, sha256_of, sync, write_text
+from wristctl.records.copied_inputs import copy_code, sealed_files, sealed_references, write_files
+from wristctl.records.files import sha256_of, sync, write_bytes, write_text
 from wristctl.records.journal import now
 from wristctl.records.lock import RunLock
 from wristctl.records.manifest import (
@@ -66,6 +66,44 @@ def start_run(
     """
     files = sealed_files(study, kind)
     digest = config_hash(files.study, kind)
+
+    def begun(path: Path) -> LiveRun:
+        code, patch, sources = code_state()
+        code.foreign = dict(copy_code(path, foreign))
+        environment, packages = environment_state()
+        write_text(path / CONFIG, resolved_yaml(files.study, kind))
+        write_files(path, files.contents)
+        write_text(path / PACKAGES, packages)
+        write_text(path / SOURCES, sources)
+        if patch:
+            write_bytes(path / PATCH, patch)
+            code.patch_sha256 = sha256_of(path / PATCH)
+        records = [
+            Input(
+                role=source.role,
+                kind=source.run.kind,
+                run=source.run.manifest.id,
+                path=str(source.run.path),
+                result_sha256=source.run.result_hash,
+            )
+            for source in inputs
+        ]
+        manifest = Manifest(
+            id=path.name,
+            kind=kind,
+            label=label,
+            about=about,
+            argv=list(argv or sys.argv),
+            config_sha256=digest,
+            seed=files.study.seed,
+            code=code,
+            environment=environment,
+            inputs=records,
+            timing=Timing(started=now()),
+            fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in records}),
+        )
+        return LiveRun(path, manifest, page, files.names, sealed_references(foreign))
+
     path, lock = None, None
     with interrupts() as interrupt:
         try:
@@ -78,7 +116,7 @@ def start_run(
                         lock = RunLock(path)
                     except FileNotFoundError:  # `runs gc` saw an empty folder, and took it away
                         path = _new_directory(out, kind, label, digest)
-            run = _begin(path, kind, files, label, argv, inputs, digest, page, foreign, about)
+            run = begun(path)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
                 if path is not None:
@@ -106,11 +144,8 @@ def start_run(
 
 def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9_.-]{0,60}", label):
-        raise UserError(
-            "a label holds letters, digits, dots, dashes and underscores",
-            Argument("label", label),
-            "shorten or respell it",
-        )
+        problem = "a label holds letters, digits, dots, dashes and underscores"
+        raise UserError(problem, Argument("label", label), "shorten or respell it")
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     name = "-".join(part for part in (stamp, kind, label, digest[:6]) if part)
     attempt = 1
@@ -118,7 +153,11 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         path = out / (name if attempt == 1 else f"{name}-{attempt}")
         try:
             path.mkdir(parents=True)
-            _keep(path)
+            try:
+                sync(path.parent)
+            except OSError:  # the disk refuses: there is no new folder then
+                path.rmdir()
+                raise
             return path
         except FileExistsError:
             if not path.is_dir():
@@ -129,72 +168,6 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         except OSError as error:
             problem = f"cannot create a run directory: {error.strerror}"
             raise UserError(problem, str(out), ("choose a folder you can write to with ", OUT)) from error
-
-
-def _keep(path: Path) -> None:
-    """Wait until a new folder is on the disk; where the disk refuses there is none."""
-    try:
-        sync(path.parent)
-    except OSError:
-        path.rmdir()
-        raise
-
-
-def _begin(
-    path: Path,
-    kind: str,
-    files: SealedFiles,
-    label: str,
-    argv: Sequence[str],
-    inputs: Sequence[InputRun],
-    digest: str,
-    page: Page | None,
-    foreign: Sequence[Foreign],
-    about: str,
-) -> LiveRun:
-    code, patch, sources = code_state()
-    code.foreign = dict(copy_code(path, foreign))
-    environment, packages = environment_state()
-    write_text(path / CONFIG, resolved_yaml(files.study, kind))
-    write_files(path, files.contents)
-    write_text(path / PACKAGES, packages)
-    write_text(path / SOURCES, sources)
-    if patch:
-        with replacing(path / PATCH) as temporary:
-            temporary.write_bytes(patch)
-        code.patch_sha256 = sha256_of(path / PATCH)
-    records = [
-        Input(
-            role=source.role,
-            kind=source.run.kind,
-            run=source.run.manifest.id,
-            path=str(source.run.path),
-            result_sha256=source.run.result_hash,
-        )
-        for source in inputs
-    ]
-    return LiveRun(
-        path,
-        Manifest(
-            id=path.name,
-            kind=kind,
-            label=label,
-            about=about,
-            argv=list(argv or sys.argv),
-            config_sha256=digest,
-            seed=files.study.seed,
-            code=code,
-            environment=environment,
-            inputs=records,
-            timing=Timing(started=now()),
-            fingerprint=fingerprint(
-                digest, code, environment, {record.role: record.result_sha256 for record in records}
-            ),
-        ),
-        page,
-        files.names,
-        sealed_references(foreign),
-    )
 
 
 def fingerprint(config: str, code: Code, environment: Environment, inputs: Mapping[str, str]) -> str:

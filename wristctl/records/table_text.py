@@ -6,10 +6,10 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from wristctl.errors import UserError
+from wristctl.records.recorded_table import RecordedTable
 
 _MARKS = (";", "\t", ",")
 _COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
@@ -17,19 +17,6 @@ _POINT = re.compile(r"\s*[-+]?\d*\.\d*(?:[eE][-+]?\d+)?\s*")
 _OF_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 _MOST_TEXT = 20
 """Rows for each line of text that may stand among them."""
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """Header and rows of a table, as many cells in each."""
-
-    heads: Sequence[str]
-    header_line: int
-    rows: Sequence[Sequence[str]]
-    lines: Sequence[int]
-    """Line of the file of each row."""
-    remarks: Sequence[str]
-    """What was passed over or read in another way, a sentence each."""
 
 
 def decoded(raw: bytes) -> str:
@@ -53,16 +40,17 @@ def cells_of(lines: Sequence[str], mark: str) -> list[list[str]]:
     return rows if len(rows) == len(lines) else [next(csv.reader([line], delimiter=mark)) for line in lines]
 
 
-def table_of(text: str, file: Path, units: Collection[str], header: str) -> TextTable | None:
-    """Part a text into a header and rows; None where nothing stands in it.
+def table_of(text: str, file: Path, units: Collection[str], header: str, what: str) -> RecordedTable:
+    """Part a text into a header and rows.
 
     Semicolons, tabs or commas part cells; a comma is decimal where one of the first two does. A line of `units` under
     the header gives the columns their units; repeated headers, and up to one line of text for twenty rows, are passed
-    over. Raises UserError with the line for rows of another length; `header` is what a header may look like.
+    over. Raises UserError for an empty text, which is a `what`, and with the line for rows of another length; `header`
+    is what a header may look like.
     """
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
-        return None
+        raise UserError(f"the {what} is empty", str(file), f"a header such as {header}, samples below")
     mark = _mark_of([line for _, line in lines])
     parted = list(zip((k for k, _ in lines), cells_of([line for _, line in lines], mark), strict=True))
     width = Counter(len(row) for _, row in parted).most_common(1)[0][0]
@@ -100,7 +88,8 @@ def table_of(text: str, file: Path, units: Collection[str], header: str) -> Text
     if mark != "," and commas and not points:
         rows = [[cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows]
         remarks.append(f"{file.name}: commas are read as decimal ones.")
-    return TextTable(heads, header_line, rows, [line for line, _ in kept], remarks)
+    cells = [[row[place] for row in rows] for place in range(len(heads))]
+    return RecordedTable(heads, cells, [line for line, _ in kept], header_line, remarks)
 
 
 def _mark_of(lines: Sequence[str]) -> str:

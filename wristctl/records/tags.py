@@ -25,8 +25,9 @@ def read_tags(results: Path) -> dict[str, list[str]]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise UserError(f"cannot read the tags: {reason}", str(results / TAGS), "mend or delete it") from error
-    if isinstance(content, dict) and all(_is_list_of_tags(tags) for tags in content.values()):
-        return content
+    lists = content.values() if isinstance(content, dict) else [None]
+    if all(isinstance(tags, list) and all(isinstance(tag, str) for tag in tags) for tags in lists):
+        return dict(content)
     raise UserError("the tags are no lists by run id", str(results / TAGS), "mend or delete it")
 
 
@@ -52,7 +53,3 @@ def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterab
             tags[run] = remaining
         write_text(results / TAGS, json.dumps(tags, indent=2, sort_keys=True) + "\n")
     return remaining
-
-
-def _is_list_of_tags(tags: object) -> bool:
-    return isinstance(tags, list) and all(isinstance(tag, str) for tag in tags)

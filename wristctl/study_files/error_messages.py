@@ -120,12 +120,8 @@ def _fix(detail: Any) -> str:
     if field is None or not field.description:
         return ""
     unit, default = unit_of(field), repr(field.default)
-    expected = f"{field.description} [{unit}]" if unit else field.description
-    return (
-        f"{expected}, default {default}"
-        if len(default) <= 40 and not (field.is_required() or field.default is None)
-        else expected
-    )
+    told = len(default) <= 40 and not (field.is_required() or field.default is None)
+    return field.description + f" [{unit}]" * bool(unit) + f", default {default}" * told
 
 
 def _or_a_list(path: KeyPath) -> str:
@@ -185,16 +181,24 @@ _SENSIBLE = {"stiffness": (1e-3, 1e3), "force": (0.0, 1e3), "load": (0.0, 1e3), 
 
 
 def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
-    """UserError for a length, stiffness or force that was given and cannot well be meant."""
-    check_lengths(study, origins)
+    """UserError, with what may have been meant, for a length, stiffness or force that cannot well be meant."""
     for path, where in _with_items(study, origins):
         _, field = field_at(path)
-        low, high = _SENSIBLE.get(str(path[-1]), (0.0, math.inf))
-        value = _at(study, path) if field is not None and unit_of(field) else None
-        if isinstance(value, float | int) and value != 0.0 and not low <= abs(value) <= high:
-            assert field is not None
-            problem = f"{value:g} {unit_of(field)} is not between {low:g} and {high:g}"
-            raise UserError(problem, (where, f": {'.'.join(map(str, path))}"), "is that meant? go on with --force")
+        unit, name = unit_of(field) if field is not None else "", str(path[-1])
+        value = _at(study, path) if unit else None
+        if field is None or not isinstance(value, float | int):
+            continue
+        place: Phrase = (where, f": {'.'.join(map(str, path))}")
+        if unit == "m":
+            usual = _USUAL.get(name) if field.default is None else field.default
+            if isinstance(usual, float) and 0.0 < _TIMES * usual < abs(value):
+                meant = _meant(float(value), usual, field.default is None and name in _BELIEVED)
+                problem = f"{value:g} m is {value / usual:,.0f} times the usual: {meant}"
+                raise UserError(problem, place, "give it in metres, or go on with --force")
+        low, high = _SENSIBLE.get(name, (0.0, math.inf))
+        if value != 0.0 and not low <= abs(value) <= high:
+            problem = f"{value:g} {unit} is not between {low:g} and {high:g}"
+            raise UserError(problem, place, "is that meant? go on with --force")
 
 
 def _with_items(study: Study, origins: Mapping[KeyPath, Phrase]) -> Iterator[tuple[KeyPath, Phrase]]:
@@ -207,23 +211,6 @@ def _with_items(study: Study, origins: Mapping[KeyPath, Phrase]) -> Iterator[tup
                 inner = (*path, number, key)
                 if inner not in origins:
                     yield inner, where
-
-
-def check_lengths(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
-    """UserError, with what may have been meant, for a length that was given and is far beyond the default's size."""
-    for path, where in _with_items(study, origins):
-        _, field = field_at(path)
-        if field is None or unit_of(field) != "m":
-            continue
-        value, usual, name = _at(study, path), field.default, str(path[-1])
-        override = usual is None and name in _BELIEVED
-        if usual is None:
-            usual = _USUAL.get(name)
-        if isinstance(value, float | int) and isinstance(usual, float) and 0.0 < _TIMES * usual < abs(value):
-            meant = _meant(float(value), usual, override)
-            key = ".".join(map(str, path))
-            fix = "give it in metres, or go on with --force"
-            raise UserError(f"{value:g} m is {value / usual:,.0f} times the usual: {meant}", (where, f": {key}"), fix)
 
 
 def _meant(value: float, usual: float, override: bool) -> str:
@@ -239,9 +226,7 @@ def _at(study: Study, path: KeyPath) -> Any:
         if isinstance(node, Mapping | tuple | list):
             node = node[key]  # type: ignore[index]
         else:
-            names = {
-                yaml_key: name for name, yaml_key in zip(type(node).model_fields, keys_of(type(node)), strict=True)
-            }
+            names = dict(zip(keys_of(type(node)), type(node).model_fields, strict=True))
             if key not in names:
                 return None
             node = getattr(node, names[str(key)])

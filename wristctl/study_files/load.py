@@ -87,8 +87,7 @@ def read_study(
     leave_out_removed(data, origins)
     for override in overrides:
         setting = Setting(override)
-        document = with_gains_apart(with_keys_of_today(_override(override, command), setting, former), setting)
-        _merge(data, _whole(document, None), setting, origins)
+        _merge(data, _today(_override(override, command), setting, None, former), setting, origins)
     for name, value in keywords.items():
         _merge_keyword(data, origins, name, value, command or "", former)
     with_loops_of_today(data, origins, former)
@@ -164,8 +163,7 @@ def _merge_file(
         check_within(inner, file)
         _merge_file(data, inner, origins, (*outer, file), former)
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
-    document = with_gains_apart(with_keys_of_today(Document(content, lines), str(file), former), str(file))
-    _merge(data, _whole(document, file), str(file), origins)
+    _merge(data, _today(Document(content, lines), str(file), file, former), str(file), origins)
 
 
 def _merge_keyword(
@@ -179,8 +177,7 @@ def _merge_keyword(
     whole = as_a_file_has_it(value, where)
     for key in reversed(path):
         whole = {key: whole}
-    document = with_gains_apart(with_keys_of_today(Document(whole, {}), where, former), where)
-    _merge(data, _whole(document, None), where, origins)
+    _merge(data, _today(Document(whole, {}), where, None, former), where, origins)
 
 
 def _merge_wrist(
@@ -207,11 +204,8 @@ def _read(file: Path) -> Document:
         raise UserError(problem, str(file), _studies_in(file) or fix_to_read(error)) from error
     document = parse_yaml(text, str(file))
     if document.data is not None and not isinstance(document.data, dict):
-        raise UserError(
-            "a study file holds keys and values",
-            f"{file}:1",
-            f"one of {', '.join(keys_of(Study))} at the top",
-        )
+        fix = f"one of {', '.join(keys_of(Study))} at the top"
+        raise UserError("a study file holds keys and values", f"{file}:1", fix)
     return document
 
 
@@ -225,8 +219,12 @@ def _studies_in(folder: Path) -> str:
     return f"name a study file in it: {', '.join(names[:_NAMED])}{more}" if names else "it holds no study file"
 
 
-def _whole(document: Document, file: Path | None) -> Document:
-    """With the files and the code that it names by their whole paths, which count from the file, or else from here."""
+def _today(document: Document, where: Phrase, file: Path | None, former: NewNames) -> Document:
+    """With keys as they are called today, and gains apart from controllers.
+
+    The files and the code that it names have their whole paths, which count from the file, or else from here.
+    """
+    document = with_gains_apart(with_keys_of_today(document, where, former), where)
     folder = file.parent if file else Path()
     return Document(placed(_found_from(document.data, folder), file), document.lines)
 
@@ -259,11 +257,9 @@ def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:
         return data
     if names_a_file(field_at(path)[1]):
         return beside(folder, data)
-    return (
-        tuple(_found_from(each, folder, (*path, position)) for position, each in enumerate(data))
-        if isinstance(data, tuple)
-        else data
-    )
+    if isinstance(data, str):
+        return data
+    return tuple(_found_from(each, folder, (*path, position)) for position, each in enumerate(data))
 
 
 def _merge(data: dict[str, Any], document: Document, source: Phrase, origins: dict[KeyPath, Phrase]) -> None:

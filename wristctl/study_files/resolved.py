@@ -209,6 +209,4 @@ def _scalar(value: Any) -> str:
         if _WORD.fullmatch(value) and parse_yaml(value, "").data == value:
             return value
         return yaml.safe_dump(value, default_style='"', width=10**9, allow_unicode=True).strip()
-    return (
-        {None: "null", True: "true", False: "false"}[value] if value is None or isinstance(value, bool) else repr(value)
-    )
+    return json.dumps(value) if value is None or isinstance(value, bool) else repr(value)

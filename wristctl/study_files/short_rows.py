@@ -24,7 +24,8 @@ def with_gains_apart(document: Document, place: Phrase) -> Document:
 def _apart(data: Any, path: KeyPath, lines: dict[KeyPath, int], place: Phrase) -> Any:
     if isinstance(data, tuple):
         return tuple(_apart(item, (*path, position), lines, place) for position, item in enumerate(data))
-    if isinstance(data, str) and path[-1:] and isinstance(path[-1], int) and keys_of(Row).keys() <= _keys_at(path):
+    in_list = isinstance(data, str) and path[-1:] and isinstance(path[-1], int)
+    if in_list and keys_of(Row).keys() <= keys_of(field_at(path)[0]).keys():
         return row_typed(data)
     if not isinstance(data, dict):
         return data
@@ -39,10 +40,6 @@ def _apart(data: Any, path: KeyPath, lines: dict[KeyPath, int], place: Phrase) -
     if key in lines:
         lines[*path, "gains"] = lines[key]
     return data | parts.groupdict()
-
-
-def _keys_at(path: KeyPath) -> set[str]:
-    return set(keys_of(field_at(path)[0]))
 
 
 def row_typed(name: str) -> dict[str, str]:
@@ -65,11 +62,12 @@ def for_their_own_controller(data: dict[str, Any], origins: dict[KeyPath, Phrase
         section["gains"] = {name: value for name, value in gains.items() if ("gains", name) in overridden}
     if ("gains",) not in overridden and not (isinstance(gains, str) and "=" not in gains):
         section.pop("gains", None)
-        _forget(origins, ("simulate", "gains"))
+        forget(origins, ("simulate", "gains"))
     return ("gains",) not in overridden
 
 
-def _forget(origins: dict[KeyPath, Phrase], beneath: KeyPath) -> None:
+def forget(origins: dict[KeyPath, Phrase], beneath: KeyPath) -> None:
+    """Forget where a key, and all beneath it, was given."""
     for path in [path for path in origins if path[: len(beneath)] == beneath]:
         del origins[path]
 
@@ -91,7 +89,7 @@ def in_lists(data: dict[str, Any], origins: dict[KeyPath, Phrase]) -> None:
             field = field_at((name, leaf))[1]
             rows = section.get(leaf, tuple(row.model_dump() for row in field.default) if field else ())
         else:
-            _forget(origins, (name, leaf))
+            forget(origins, (name, leaf))
         if not isinstance(rows, tuple) or not all(isinstance(row, dict) for row in rows):
             continue  # which the validation says
         section[leaf] = tuple(row | one for row in rows)

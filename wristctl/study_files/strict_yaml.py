@@ -79,12 +79,8 @@ def _mapping(node: yaml.MappingNode, path: KeyPath, lines: dict[KeyPath, int], s
         if not isinstance(key, yaml.ScalarNode):
             raise UserError("a key must be a word", f"{source}:{line}")
         if key.value in mapping:
-            first = lines[*path, key.value]
-            raise UserError(
-                f"key {key.value!r} is repeated",
-                f"{source}:{line}",
-                f"keep one (the first is on line {first})",
-            )
+            fix = f"keep one (the first is on line {lines[*path, key.value]})"
+            raise UserError(f"key {key.value!r} is repeated", f"{source}:{line}", fix)
         lines[*path, key.value] = line
         mapping[key.value] = _read(value, (*path, key.value), lines, source)
     return mapping

@@ -51,7 +51,7 @@ class SweepAxis(NamedTuple):
 
 def axes_of(study: Study, command: str) -> list[SweepAxis]:
     """The axes of the study's `sweep`. UserError for one that cannot be read, and for more points than MOST_POINTS."""
-    axes, counted = list[SweepAxis](), list[tuple[str, int, bool]]()
+    axes, counted = list[SweepAxis](), list[tuple[int, bool]]()
     for text in study.sweep:
         key, equals, values = text.partition("=")
         if not equals or not key.strip() or not values.strip():
@@ -60,12 +60,11 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
         check_read(name, command, Argument("sweep", text))
         if name in [axis.key for axis in axes]:
             raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
-        counted.append((text, *_count(text, values)))
-        if _points([(many, drawn) for _, many, drawn in counted], text) > MOST_POINTS:
-            many = _points([(many, drawn) for _, many, drawn in counted], text)
+        counted.append(_count(text, values))
+        if (many := _points(counted, text)) > MOST_POINTS:
             problem = f"a sweep of {many:.3g} points is more than {MOST_POINTS:g}"
             raise UserError(problem, Argument("sweep", text), "fewer values, or drawn ones with ~ in place of all")
-        axes.append(SweepAxis(name, _values(text, values, name, study.seed), counted[-1][2], text))
+        axes.append(SweepAxis(name, _values(text, values, name, study.seed), counted[-1][1], text))
     return axes
 
 
@@ -115,6 +114,10 @@ def unit_at(begin: Section, path: Sequence[str]) -> str:
 def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -> Any:
     """The section with a leaf at another value; only what lies on the way to it is made anew, and checked."""
     head, *below_head = path
+
+    def changed(current: Any) -> Any:
+        return _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
+
     if isinstance(section, Section):
         fields = _names(type(section))
         extra = section.model_extra or {}
@@ -122,11 +125,10 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
             raise UserError(f"there is no setting {axis.key}", axis.where, meant(head, fields))
         name = fields.get(head, head)
         current = getattr(section, name, None)
-        new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
+        new = changed(current)
         if not below_head and isinstance(current, Section):
-            raise UserError(
-                f"{axis.key} is a group of settings", axis.where, f"one of {', '.join(keys_of(type(current)))}"
-            )
+            fix = f"one of {', '.join(keys_of(type(current)))}"
+            raise UserError(f"{axis.key} is a group of settings", axis.where, fix)
         if below_head and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
             return section.model_copy(update={name: new})
         # all that it has, since what is left out would be a default, copied deeply
@@ -137,12 +139,9 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         head = head if head in section else LOOPS.get(head, head)
         if head not in section:
             raise UserError(f"there is no setting {axis.key}", axis.where, meant(head, map(str, section)))
-        new = _changed(section[head], tuple(below_head), value, axis) if below_head else _alike(section[head], value)
-        return {**section, head: new}
+        return {**section, head: changed(section[head])}
     if isinstance(section, tuple) and head.isdigit() and int(head) < len(section):
-        current = section[int(head)]
-        new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
-        return (*section[: int(head)], new, *section[int(head) + 1 :])
+        return (*section[: int(head)], changed(section[int(head)]), *section[int(head) + 1 :])
     raise UserError(f"there is no setting {axis.key}", axis.where, "one that `--dry-run --all` shows")
 
 

@@ -11,14 +11,15 @@ from wristctl.config.foreign import is_reference
 from wristctl.errors import Call, Phrase, Setting, UserError, nearest, plain
 from wristctl.plugins.places import placed
 from wristctl.study_files.shipped import shipped_names, studies_beside, study_file
-from wristctl.study_files.short_rows import row_typed
+from wristctl.study_files.short_rows import forget, row_typed
 from wristctl.study_files.strict_yaml import KeyPath
 
 # Commands among whose study files controllers may be typed.
 TAKE_CONTROLLERS = ("compare", "hw-run", "tune", "recommend", "study")
 # Those of them that search the gains of every controller.
 _SEARCHING = ("tune", "recommend", "study")
-_STUDIES = (".yaml", ".yml")
+STUDIES = (".yaml", ".yml")
+"""Ends of the names of study files."""
 
 
 class Typed(NamedTuple):
@@ -40,12 +41,16 @@ def parted(arguments: Sequence[str], command: str) -> Typed:
     return Typed(controllers, [Path(argument) for argument in arguments if argument not in controllers])
 
 
-def _is_controller(argument: str) -> bool:
-    if argument.endswith(_STUDIES):
-        return False
+def names_controller(argument: str) -> bool:
+    """Whether an argument has the form, or the name, of a controller: NAME, NAME/GAINS or file.py:NAME."""
     name = row_typed(argument)["controller"]
-    named = is_reference(name) or name in CONTROLLERS or name in CONTROLLERS.made
-    study = study_file(Path(argument))
+    return is_reference(name) or name in CONTROLLERS or name in CONTROLLERS.made
+
+
+def _is_controller(argument: str) -> bool:
+    if argument.endswith(STUDIES):
+        return False
+    named, study = names_controller(argument), study_file(Path(argument))
     if named and study is not None and not study.is_dir():
         raise UserError(f"'{argument}' is a controller and a study", str(study), _both(argument, study))
     if named or (study is not None and study.suffix != ".py"):
@@ -57,7 +62,7 @@ def _is_controller(argument: str) -> bool:
 
 def _both(argument: str, study: Path) -> Phrase:
     """The spelling of the study, and that of the controller."""
-    as_study = f"{argument}.yaml" if study.suffix in _STUDIES else f"./{argument}"
+    as_study = f"{argument}.yaml" if study.suffix in STUDIES else f"./{argument}"
     row = row_typed(argument)
     if row["gains"] == BY_LOOP:
         return f"{as_study} for the study, {argument}/default or another preset for the controller"
@@ -111,7 +116,8 @@ def put_in(
             raise UserError("--tune is for controllers that are typed by name, and none is", "--tune", fix)
         return
     rows = {argument: row_typed(argument) for argument in controllers}
-    _refuse_twice(controllers)
+    if twice := [argument for argument in controllers if controllers.count(argument) > 1]:
+        raise UserError(f"{twice[0]} is typed twice", twice[0], "each controller with its gains once")
     section = data.setdefault(command, {})
     if not isinstance(section, dict):  # which the validation says
         return
@@ -123,10 +129,9 @@ def put_in(
             raise UserError(f"{command} searches the gains of a controller itself", fixed[0], f"the name alone: {name}")
         _replace(section, origins, (command, "controllers"), names, [placed(name, None) for name in names])
         if command == "study":
-            _replace(
-                section, origins, (command, "presets"), fixed, [placed(rows[argument], None) for argument in fixed]
-            )
-            labels = {*(f"{name}/tuned" for name in names), *map(_label, fixed)}
+            presets = [placed(rows[argument], None) for argument in fixed]
+            _replace(section, origins, (command, "presets"), fixed, presets)
+            labels = {*(f"{name}/tuned" for name in names), *(label_of(**rows[argument]) for argument in fixed)}
             _keep_terms(section, origins, labels)
         return
     if command == "hw-run":
@@ -138,11 +143,6 @@ def put_in(
         _settle_tuning(section, origins, chosen.values(), tune)
 
 
-def _label(argument: str) -> str:
-    """Label that the row of a typed controller has in tables."""
-    return label_of(**row_typed(argument))
-
-
 def _keep_terms(section: dict[str, Any], origins: dict[KeyPath, Phrase], labels: Container[str]) -> None:
     """Leave of a study's questions those that are of these rows alone."""
     terms = section.get("terms")
@@ -152,13 +152,7 @@ def _keep_terms(section: dict[str, Any], origins: dict[KeyPath, Phrase], labels:
         name for name, pair in terms.items() if isinstance(pair, tuple) and not all(p in labels for p in pair)
     ]:
         del terms[question]
-        _forget(origins, ("study", "terms", question))
-
-
-def _refuse_twice(controllers: Sequence[str]) -> None:
-    twice = [argument for argument in controllers if controllers.count(argument) > 1]
-    if twice:
-        raise UserError(f"{twice[0]} is typed twice", twice[0], "each controller with its gains once")
+        forget(origins, ("study", "terms", question))
 
 
 def _refuse_beside(origins: Mapping[KeyPath, Phrase], rows: Mapping[str, Mapping[str, str]]) -> None:
@@ -187,9 +181,9 @@ def _settle_tuning(
     search = section.get("tuning")
     if not names or not (tune or isinstance(search, dict)):
         section.pop("tuning", None)
-        _forget(origins, place)
+        forget(origins, place)
         return
-    _forget(origins, (*place, "controllers"))
+    forget(origins, (*place, "controllers"))
     section["tuning"] = (search if isinstance(search, dict) else {}) | {"controllers": tuple(names)}
     origins.setdefault(place, "--tune")
     origins[*place, "controllers"] = "--tune" if tune else ", ".join(names)
@@ -203,13 +197,8 @@ def _replace(
     entries: Sequence[Any],
 ) -> None:
     """Put entries of a list in place of what a section had, each with the argument that it is from."""
-    _forget(origins, place)
+    forget(origins, place)
     section[str(place[-1])] = tuple(entries)
     origins.setdefault(place[:1], " ".join(arguments))
     origins[place] = " ".join(arguments)
     origins.update({(*place, number): argument for number, argument in enumerate(arguments)})
-
-
-def _forget(origins: dict[KeyPath, Phrase], beneath: KeyPath) -> None:
-    for path in [path for path in origins if path[: len(beneath)] == beneath]:
-        del origins[path]

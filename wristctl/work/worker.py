@@ -156,7 +156,8 @@ def compute(does: str, spec: Mapping[str, Any], golden: Golden | None, furnish: 
     if furnish is not None:
         _furnish(furnish)
     if golden is not None and (golden.expected, golden.code) not in _passed:
-        with _ONE, locked(_turn()):
+        # workers of one machine take turns, so that the first compiles for all
+        with _ONE, locked(Path(tempfile.gettempdir()) / f"wristctl-golden-{os.getuid()}.lock"):
             _check(golden, host)
     start, processor = time.perf_counter(), time.process_time()
     try:
@@ -190,8 +191,3 @@ def _check(golden: Golden, host: str) -> None:
         numbers = f"its golden rollout is {digest[:12]} and not {golden.expected[:12]}"
         raise WorkerDiffers(f"the worker on {host} ({platform.machine()}) computes other numbers: {numbers}")
     _passed.add((golden.expected, golden.code))
-
-
-def _turn() -> Path:
-    """A file whose lock the workers of one machine take in turn, so that the first compiles for all."""
-    return Path(tempfile.gettempdir()) / f"wristctl-golden-{os.getuid()}.lock"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.config.choices import CONTROLLERS
-from wristctl.config.foreign import is_reference
 from wristctl.config.plant import TrueActuator, TrueSensor
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
@@ -21,6 +20,7 @@ from wristctl.records.lineage import input_run
 from wristctl.study_files.load import load_study
 from wristctl.study_files.shipped import study_file
 from wristctl.study_files.short_rows import row_typed
+from wristctl.study_files.typed_controllers import STUDIES, names_controller
 from wristctl.version import __version__
 
 if TYPE_CHECKING:
@@ -59,15 +59,48 @@ def export_law(words: Sequence[str], overrides: Sequence[str], folder: Path | No
     `words` are a controller (NAME, NAME/GAINS or file.py:NAME) with study files, or a run in the folder `out`, with a
     controller where the run has several. Raises UserError for a law that has no such form, and for a file in the way.
     """
-    study, about = _chosen(words, overrides, out)
-    return _write(study, about, folder)
+    from wristctl.commands.export.law_in_c import c_files
+    from wristctl.commands.export.law_in_numpy import largest_difference, numpy_module
+    from wristctl.commands.export.law_programs import programs_of
+    from wristctl.commands.export.law_readme import readme
+    from wristctl.commands.export.law_vectors import loop_of, vectors_of
+    from wristctl.control.table import controller, gains_of
+
+    study, source = _chosen(words, overrides, out)
+    chosen = study.simulate
+    law = controller(chosen.controller)
+    gains = gains_of(law, chosen.gains, None, chosen.loop)
+    named = ", ".join(f"{name} = {value:.6g}" for name, value in zip(law.gains, gains, strict=True))
+    about = printable(f"{law.name}{f' with {named}' * bool(named)}, {source}; written by wristctl {__version__}.")
+    batch = loop_of(_as_believed(study), law, np.array([gains]), _MOST_TICKS)
+    programs = programs_of(law, batch)
+    vectors, module = vectors_of(programs, batch), numpy_module(programs, about)
+    if not (difference := largest_difference(module, vectors)) <= MOST_DIFFERENCE:
+        problem = f"what would be written of {law.name} differs from the loop by {difference:.2g}"
+        reason = "torques far beyond the tendons' reach, whose rounding decides"
+        raise UserError(f"{problem}: {reason}", "gains", "other gains, or a loop in which they hold the wrist")
+    texts = c_files(programs, about) | {
+        f"{programs.name}.py": module,
+        "vectors.csv": vectors.text,
+        "README.md": readme(programs, vectors, about, _meanings(law, programs.constants)),
+    }
+    place = folder or Path(programs.name)
+    paths = [place / name for name in texts]
+    for path in paths:
+        if path.exists():
+            raise UserError("a file is in the way", str(path), "remove it, or name another folder with --folder")
+    with writing(place, FILE):
+        place.mkdir(parents=True, exist_ok=True)
+    for path, text in zip(paths, texts.values(), strict=True):
+        write_text(path, text, FILE)
+    return paths
 
 
 def _chosen(words: Sequence[str], overrides: Sequence[str], out: Path) -> tuple[Study, str]:
     """The study whose `simulate` section has loop, controller and gains, and where they are from, in words."""
     files = [Path(word) for word in words if _is_study(word)]
-    controllers = [word for word in words if not _is_study(word) and _is_controller(word)]
-    refs = [word for word in words if not _is_study(word) and not _is_controller(word)]
+    controllers = [word for word in words if not _is_study(word) and names_controller(word)]
+    refs = [word for word in words if not _is_study(word) and not names_controller(word)]
     if len(controllers) > 1 or len(refs) > 1 or (refs and files):
         raise UserError(
             "one controller is exported at a time", " ".join(words), "a controller with study files, or a run"
@@ -80,16 +113,8 @@ def _chosen(words: Sequence[str], overrides: Sequence[str], out: Path) -> tuple[
 
 
 def _is_study(word: str) -> bool:
-    return word.endswith((".yaml", ".yml")) or (not _is_controller(word) and _is_file(study_file(Path(word))))
-
-
-def _is_file(path: Path | None) -> bool:
-    return path is not None and path.is_file()
-
-
-def _is_controller(word: str) -> bool:
-    name = row_typed(word)["controller"]
-    return is_reference(name) or name in CONTROLLERS or name in CONTROLLERS.made
+    study = study_file(Path(word))
+    return word.endswith(STUDIES) or (not names_controller(word) and study is not None and study.is_file())
 
 
 def _run(ref: str, out: Path) -> Run:
@@ -155,48 +180,6 @@ def _of_trials(run: Run, controller: str | None) -> Study:
         horizon=settings.horizon,
     )  # fmt: skip
     return study.model_copy(update={"simulate": simulated})
-
-
-def _write(study: Study, source: str, folder: Path | None) -> list[Path]:
-    from wristctl.commands.export.law_in_c import c_files
-    from wristctl.commands.export.law_in_numpy import largest_difference, numpy_module
-    from wristctl.commands.export.law_programs import programs_of
-    from wristctl.commands.export.law_readme import readme
-    from wristctl.commands.export.law_vectors import loop_of, vectors_of
-    from wristctl.control.table import controller, gains_of
-
-    chosen = study.simulate
-    law = controller(chosen.controller)
-    gains = gains_of(law, chosen.gains, None, chosen.loop)
-    named = ", ".join(f"{name} = {value:.6g}" for name, value in zip(law.gains, gains, strict=True))
-    about = printable(f"{law.name}{f' with {named}' * bool(named)}, {source}; written by wristctl {__version__}.")
-    batch = loop_of(_as_believed(study), law, np.array([gains]), _MOST_TICKS)
-    programs = programs_of(law, batch)
-    vectors, module = vectors_of(programs, batch), numpy_module(programs, about)
-    _check(law.name, largest_difference(module, vectors))
-    texts = c_files(programs, about) | {
-        f"{programs.name}.py": module,
-        "vectors.csv": vectors.text,
-        "README.md": readme(programs, vectors, about, _meanings(law, programs.constants)),
-    }
-    place = folder or Path(programs.name)
-    paths = [place / name for name in texts]
-    for path in paths:
-        if path.exists():
-            raise UserError("a file is in the way", str(path), "remove it, or name another folder with --folder")
-    with writing(place, FILE):
-        place.mkdir(parents=True, exist_ok=True)
-    for path, text in zip(paths, texts.values(), strict=True):
-        write_text(path, text, FILE)
-    return paths
-
-
-def _check(name: str, difference: float) -> None:
-    """UserError where what is written does not answer as the loop does."""
-    if not difference <= MOST_DIFFERENCE:
-        problem = f"what would be written of {name} differs from the loop by {difference:.2g}"
-        reason = "torques far beyond the tendons' reach, whose rounding decides"
-        raise UserError(f"{problem}: {reason}", "gains", "other gains, or a loop in which they hold the wrist")
 
 
 def _as_believed(study: Study) -> Study:

@@ -2,8 +2,8 @@
 
 from string import Template
 
-from wristctl.commands.export.law_programs import LawPrograms, Observed
-from wristctl.commands.export.written_code import c_function, listed, number
+from wristctl.commands.export.law_programs import LEVELS, LawPrograms, Observed
+from wristctl.commands.export.written_code import c_function, listed, number, shared_words
 from wristctl.control.response import OF_A_PLANE
 
 _HEADER = Template("""\
@@ -223,13 +223,6 @@ int main(int argc, char **argv)
 }
 """)
 
-_COUNTS = {
-    "ideal": "the pull again [N]",
-    "lagged": "the pull that the motors have come to [N]",
-    "tendon": "where the spool is believed to be in the middle of this period, reeled in [m]",
-    "servo": "where the spool is believed to be in the middle of this period, reeled in [m]",
-}
-
 
 def c_files(programs: LawPrograms, about: str) -> dict[str, str]:
     """Texts of header, source and test by the names of their files."""
@@ -244,21 +237,16 @@ def c_files(programs: LawPrograms, about: str) -> dict[str, str]:
 def _words(programs: LawPrograms, about: str) -> dict[str, str]:
     planes, places, inputs = programs.planes, programs.places, programs.inputs
     results = planes + 2 * places
-    words = {
-        "about": about.replace("*/", "* /"), "name": programs.name, "upper": programs.name.upper(),
-        "planes": str(planes), "places": str(places), "reference": str(programs.of_a_plane * planes),
-        "period": repr(programs.period), "of_a_plane": str(programs.of_a_plane), "memory": str(programs.memory),
-        "motors": str(len(programs.motors)), "motor_start": listed(programs.motors), "withheld": str(2 * places),
-        "alike": listed(programs.alike), "count_words": _COUNTS[programs.level], "driven": programs.driven,
+    words = shared_words(programs) | {
+        "about": about.replace("*/", "* /"), "upper": programs.name.upper(), "motors": str(len(programs.motors)),
+        "count_words": LEVELS[programs.level].reckoned,
         "place_words": "the + and the - side" if planes == 1 else "tendons in the study's order",
-        "expected": str(inputs), "columns": str(inputs + results), "results": str(results),
-        "line": str(32 * (inputs + results)),
+        "columns": str(inputs + results), "results": str(results), "line": str(32 * (inputs + results)),
         "observer_words": ", its drive and its observer" if programs.observer else " and its drive",
         "speed_member": "", "speed_set": "",
     }  # fmt: skip
     if programs.remembered:
-        sent = {"tendon": "rate to send to each spool [m/s]", "servo": "target to send to each spool [m]"}
-        words["speed_member"] = f"    double {programs.driven}[{places}]; /* {sent[programs.level]}, + reels in */\n"
+        words["speed_member"] = f"    double {programs.driven}[{places}]; /* {LEVELS[programs.level].sent} */\n"
         words["speed_set"] = (
             f"        out->{programs.driven}[t] = state->motors[{2 * (places + planes)} + {programs.remembered} * t];\n"
         )
@@ -278,8 +266,7 @@ def _measured(programs: LawPrograms) -> dict[str, str]:
         f"        seen[{OF_A_PLANE} * p + 2] = 0.0;",
         "    }\n",
     ]
-    words = {"name": programs.name, "upper": programs.name.upper(), "planes": str(planes)}
-    words |= {"preview": str(programs.preview)}
+    words = shared_words(programs) | {"upper": programs.name.upper(), "preview": str(programs.preview)}
     return {
         "observed": "", "frame_declared": "", "frame_defined": "", "reset": "", "predict": "",
         "shared_declared": _SHARED.substitute(words), "shared_defined": _SHARED_BODY.substitute(words),
@@ -290,8 +277,8 @@ def _measured(programs: LawPrograms) -> dict[str, str]:
 
 def _observed(programs: LawPrograms, observer: Observed) -> dict[str, str]:
     planes, name, size = programs.planes, programs.name, OF_A_PLANE * programs.planes
-    words = {"name": name, "planes": str(planes), "of_x": str(OF_A_PLANE), "remembered": str(observer.remembered)}
-    words |= {"gain": listed(observer.gain)}
+    of_observer = {"of_x": str(OF_A_PLANE), "remembered": str(observer.remembered), "gain": listed(observer.gain)}
+    words = shared_words(programs) | of_observer
     state = [
         f"    double fused[{size}]; /* bend, rate and load of each plane at the last picture */",
         f"    double now[{size}]; /* and now */",

@@ -5,7 +5,7 @@ from typing import Any
 
 from wristctl.commands.export.law_programs import LawPrograms, Observed
 from wristctl.commands.export.law_vectors import Vectors
-from wristctl.commands.export.written_code import listed, number, numpy_function
+from wristctl.commands.export.written_code import listed, number, numpy_function, shared_words
 from wristctl.control.response import OF_A_PLANE
 
 _MODULE = Template('''\
@@ -121,14 +121,7 @@ _PREDICT = Template("""\
 
 def numpy_module(programs: LawPrograms, about: str) -> str:
     """Text of the module."""
-    words = {
-        "about": about.replace('"', "'"), "name": programs.name, "planes": str(programs.planes),
-        "places": str(programs.places), "reference": str(programs.of_a_plane * programs.planes),
-        "period": repr(programs.period), "of_a_plane": str(programs.of_a_plane), "memory": str(programs.memory),
-        "motor_start": listed(programs.motors), "withheld": str(2 * programs.places),
-        "alike": listed(programs.alike), "driven": programs.driven, "expected": str(programs.inputs),
-        "speed_field": "", "speed": "",
-    }  # fmt: skip
+    words = shared_words(programs) | {"about": about.replace('"', "'"), "speed_field": "", "speed": ""}
     if programs.remembered:
         first = 2 * (programs.places + programs.planes)
         words["speed_field"] = f"    {programs.driven}: np.ndarray\n"

@@ -27,6 +27,39 @@ from wristctl.wrist.segments import Segments
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, SpatialSegments, SpatialWrist
 
 
+class Level(NamedTuple):
+    """How motors are driven: what they are sent, and what is reckoned of them, each with its unit."""
+
+    driven: str
+    """Name of what each motor is sent."""
+    sent: str
+    reckoned: str
+    send: str
+    """What is to be done with it."""
+
+
+LEVELS = {
+    "ideal": Level("count", "", "the pull again [N]", "Command `tension` to each tendon, or `pull` to each place."),
+    "lagged": Level(
+        "count", "", "pull that the motors are reckoned to have come to [N]",
+        "Command `tension` to each tendon. `count` is what the motors are reckoned to have come to.",
+    ),
+    "tendon": Level(
+        "spool_speed", "rate to send to each spool's motor, + reels in [m/s]",
+        "length that each spool is reckoned to have reeled in, in the middle of this period [m]",
+        "Send `spool_speed` to the motor of each spool at once, which holds it until the next tick. From these rates "
+        "the controller reckons where the spools are.",
+    ),
+}  # fmt: skip
+LEVELS["servo"] = LEVELS["tendon"]._replace(
+    driven="spool_target",
+    sent="length that each spool's motor is to reel in, from where the tendon is taut [m]",
+    send="Send `spool_target` to the motor of each spool at once. From these targets the controller reckons where the "
+    "spools are.",
+)
+"""By the level of the motors."""
+
+
 class Function(NamedTuple):
     """A program with the arrays that it reads and writes, by name and length; those that it writes come last."""
 
@@ -84,7 +117,7 @@ class LawPrograms(NamedTuple):
     @property
     def driven(self) -> str:
         """What the motors are sent: `spool_speed`, `spool_target`, or `count`."""
-        return {"tendon": "spool_speed", "servo": "spool_target"}.get(self.level, "count")
+        return LEVELS[self.level].driven
 
     @property
     def functions(self) -> dict[str, Function]:

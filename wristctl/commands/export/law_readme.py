@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from string import Template
 
-from wristctl.commands.export.law_programs import LawPrograms
+from wristctl.commands.export.law_programs import LEVELS, LawPrograms
 from wristctl.commands.export.law_vectors import Vectors
 from wristctl.simulation.batch import PLANES
 
@@ -57,21 +57,6 @@ are the wrist and the motors as they were believed.
 $constants
 """)
 
-_SEND = {
-    "ideal": "Command `tension` to each tendon, or `pull` to each place.",
-    "lagged": "Command `tension` to each tendon. `count` is what the motors are reckoned to have come to.",
-    "tendon": "Send `spool_speed` to the motor of each spool at once, which holds it until the next tick. From these "
-    "rates the controller reckons where the spools are.",
-    "servo": "Send `spool_target` to the motor of each spool at once. From these targets the controller reckons where "
-    "the spools are.",
-}
-_COUNT = {
-    "ideal": "the pull again | N",
-    "lagged": "pull that the motors are reckoned to have come to | N",
-    "tendon": "length that each spool is reckoned to have reeled in, in the middle of this period | m",
-    "servo": "length that each spool is reckoned to have reeled in, in the middle of this period | m",
-}
-
 
 def readme(programs: LawPrograms, vectors: Vectors, about: str, meanings: Mapping[str, str]) -> str:
     """Text of the page; `meanings` says what a constant is, by its name."""
@@ -88,7 +73,7 @@ def readme(programs: LawPrograms, vectors: Vectors, about: str, meanings: Mappin
         title=f"{programs.title} for a firmware", about=about, name=name, ticks=len(vectors.rows),
         parts=parts,
         frames_cost=", but that a late picture costs a prediction for each tick of its age" * observer,
-        period=f"{programs.period:g}", send=_SEND[programs.level],
+        period=f"{programs.period:g}", send=LEVELS[programs.level].send,
         calls="\n".join([*calls, f"   - `{name}_tick(&state, {measured}reference, &out)`."]),
         values="\n".join(_values(programs)), places=_places(programs),
         limits=f"`pull` stays within these limits: {limits}.",
@@ -106,13 +91,10 @@ def _values(programs: LawPrograms) -> list[str]:
         "| `age` | time since the picture was taken | s |" if programs.observer else "| `rate` | its rate | rad/s |",
         "| `wanted`, `torque` | torque that is wanted, and that the pulls give | N m |",
         "| `pull`, `tension` | of all tendons of a place, and of one of them | N |",
-        f"| `count` | {_COUNT[programs.level]} |",
     ]
-    sent = {
-        "tendon": "| `spool_speed` | rate to send to each spool's motor; + reels in | m/s |",
-        "servo": "| `spool_target` | length that each spool's motor is to reel in, from where the tendon is taut | m |",
-    }
-    return [*rows, sent[programs.level]] if programs.remembered else rows
+    level = LEVELS[programs.level]
+    of_motors = [("count", level.reckoned), *[(level.driven, level.sent)] * bool(programs.remembered)]
+    return [*rows, *(f"| `{name}` | {words[:-1].replace(' [', ' | ')} |" for name, words in of_motors)]
 
 
 def _places(programs: LawPrograms) -> str:

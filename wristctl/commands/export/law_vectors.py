@@ -1,7 +1,5 @@
 """Test vectors of a law: what it is given and what it answers at each tick of a simulated loop."""
 
-import csv
-import io
 from typing import NamedTuple
 
 import numpy as np
@@ -32,11 +30,8 @@ class Vectors(NamedTuple):
     @property
     def text(self) -> str:
         """The table as CSV, every number to its last bit."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(self.columns)
-        writer.writerows([repr(value) for value in row] for row in self.rows.tolist())
-        return stream.getvalue()
+        rows = (self.columns, *(map(repr, row) for row in self.rows.tolist()))
+        return "".join(f"{','.join(row)}\n" for row in rows)
 
 
 def loop_of(study: Study, controller: Controller, gains: Array, most: int) -> Batch:
@@ -75,14 +70,13 @@ def vectors_of(programs: LawPrograms, rollout: Batch) -> Vectors:
             measured = np.concatenate([[-1.0], signals[:, _SEEN], signals[:, _SEEN + 1]])
         else:
             measured = _picture(rollout, arrived, tick, programs.planes)
-        reference = np.concatenate(
-            [signals[:, _REFERENCE : _REFERENCE + len(REFERENCE)], signals[:, len(NOW) :]], axis=1
-        ).ravel()
-        answer = (
-            record[parts["torque_wanted"]],
-            record[parts["tension"]],
-            _sent(programs, rollout, record[parts["delivered"]]),
-        )
+        now = signals[:, _REFERENCE : _REFERENCE + len(REFERENCE)]
+        reference = np.concatenate([now, signals[:, len(NOW) :]], axis=1).ravel()
+        sent = record[parts["delivered"]]
+        if programs.remembered:  # the newest rate or target of each spool
+            first = 2 * (programs.places + programs.planes)
+            sent = rollout.state.motors.reshape(-1)[first :: programs.remembered]
+        answer = record[parts["torque_wanted"]], record[parts["tension"]], sent
         rows.append(np.concatenate([measured, reference, *answer]))
     if not rows:
         raise UserError("the wrist fails at once in this loop", "simulate.loop", "`wristctl simulate` shows how")
@@ -104,15 +98,6 @@ def _picture(rollout: Batch, before: int, tick: int, planes: int) -> Array:
     shown = watch.readings[0].reshape(-1, planes + 1)[before, planes] != 0.0
     bends = watch.pictures[0].reshape(-1, planes)[before] if shown else np.full(planes, np.nan)
     return np.array([(tick - captured) * rollout.setup.period, *bends])
-
-
-def _sent(programs: LawPrograms, rollout: Batch, delivered: Array) -> Array:
-    """What the motors are sent: the newest rate or target of each spool, or else what they deliver."""
-    first = 2 * (programs.places + programs.planes)
-    if not programs.remembered:
-        return delivered
-    sent: Array = rollout.state.motors.reshape(-1)[first :: programs.remembered].copy()
-    return sent
 
 
 def _columns(programs: LawPrograms) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,8 +118,8 @@ def write_mcap(
             if seconds is not None:
                 _table(log, f"/{_word(run.kind)}/{_word(name)}", f"{run.kind} {name}", table, columns, seconds)
         for end in ("", "_2"):
-            for name, topic in (("raw", f"/camera{end}/compressed"), ("video", f"/camera{end}/annotated/compressed")):
-                _film(log, Pictures.of(run, f"{name}{end}"), topic)
+            for name, topic in (("raw", "compressed"), ("video", "annotated/compressed")):
+                _film(log, Pictures.of(run, f"{name}{end}"), f"/camera{end}/{topic}")
         log.finish(about)
     if not log.written:
         raise UserError(f"nothing in that {run.kind} run went on in time", str(run.path), "--to mat")
@@ -250,18 +250,16 @@ def _table(
     for key, values in table.items():
         unit, meaning = columns.get(str(key), ("", ""))
         of_type = _TYPES.get(values.to_numpy().dtype.kind, "string")
-        names.append(_free(_word(str(key)), names))
+        word = _word(str(key))  # of two alike the second ends in _2
+        alike = (f"{word}_{k}" for k in range(2, 2 + len(names)))
+        names.append(next(name for name in (word, *alike) if name not in names))
         told = " ".join(f"{f'[{unit}] ' if unit else ''}{meaning}".split())
         lines.append(f"{of_type} {names[-1]}{f'  # {told}' if told else ''}")
         read.append(_text if of_type == "string" else {"float64": float, "bool": bool}.get(of_type, int))
     log.declare(topic, kind, "\n".join(lines) + "\n")
     message = log.store.types[kind]
-    for second, row in zip(seconds.tolist(), _rows(table), strict=True):
+    for second, row in zip(seconds.tolist(), table.itertuples(index=False, name=None), strict=True):
         log.add(topic, second, message(*(value(cell) for value, cell in zip(read, row, strict=True))))
-
-
-def _rows(table: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
-    return zip(*(table[key].tolist() for key in table.columns), strict=True)
 
 
 def _text(cell: Any) -> str:
@@ -273,11 +271,6 @@ def _word(name: str) -> str:
     """A name as ROS has them: small letters, digits and single underscores."""
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     return word if word[:1].isalpha() else f"x{word}"
-
-
-def _free(name: str, names: Sequence[str]) -> str:
-    """The name, of two alike the second with _2."""
-    return next(free for k in range(1, 2 + len(names)) if (free := name if k == 1 else f"{name}_{k}") not in names)
 
 
 def _film(log: _Log, pictures: Pictures | None, topic: str) -> None:

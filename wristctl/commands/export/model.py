@@ -36,16 +36,11 @@ def study_of(run: Run) -> tuple[Study, str]:
     is, in words."""
     from wristctl.commands.inputs_of_loops import found_in, with_found
 
-    source = run if run.kind == "identify" else identified_in(run)
+    sources = [input_run(run, earlier) for earlier in run.manifest.inputs if earlier.role == "from_identified"]
+    source = run if run.kind == "identify" else sources[-1] if sources else None
     if source is None:
         return run.config, f"the wrist of run {run.id}"
     return with_found(run.config, "simulate", found_in(source)), f"the wrist that run {source.id} identified"
-
-
-def identified_in(run: Run) -> Run | None:
-    """The run that identified the wrist of a run; None where the study's own was taken."""
-    sources = [input_run(run, earlier) for earlier in run.manifest.inputs if earlier.role == "from_identified"]
-    return sources[-1] if sources else None
 
 
 def export_wrist(run: Run, program: str, file: Path | None, asked: Exported) -> Path:
@@ -71,12 +66,11 @@ def export_wrist(run: Run, program: str, file: Path | None, asked: Exported) -> 
     seen = wrist if planes == 2 else in_plane(wrist, asked.direction or "ulnar")
     chain = HingeChain.of(seen, asked.segments, planes, loop.plant.model)
     spools = Spools.of(loop.actuator, wrist) if asked.motors == "spools" else None
-    texts = {
-        "mujoco": lambda: mjcf(chain, about, spools),
-        "matlab": lambda: matlab(chain, about),
-        "urdf": lambda: urdf(chain, wrist.range_deg, about),
-    }
-    write_text(path, texts[program](), FILE)
+    if program == "mujoco":
+        text = mjcf(chain, about, spools)
+    else:
+        text = matlab(chain, about) if program == "matlab" else urdf(chain, wrist.range_deg, about)
+    write_text(path, text, FILE)
     return path
 
 

@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.commands.export.model import identified_in
-from wristctl.commands.inputs_of_loops import found_in, with_found
+from wristctl.commands.export.model import study_of
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
-from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
 from wristctl.records import Run
-from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.log_columns import units_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -97,26 +94,15 @@ def _trials(run: Run) -> list[RecordedMotion]:
         ticks = log[log.trial == number]
         seen = frames[(frames.trial == number) & (frames.verdict == "ok")]
         measured = [_reeled(ticks, motors), *_tensions(ticks)] if run.config.hw_run.rig else [_reeled(ticks, motors)]
-        if "plane" in seen:
-            measured += _bends_seen(seen, "captured")
-        else:
-            measured.append(_sight(seen, direction is not None and direction.plane == "flexion"))
+        flexion = direction is not None and direction.plane == "flexion"
+        measured += _bends_seen(seen, "captured") if "plane" in seen else [_sight(seen, flexion)]
         time = ticks.time.to_numpy(float) if "time" in ticks else np.empty(0)
-        wanted = _columns(ticks, _WANTED)
-        if direction is not None and direction.plane == "flexion" and "theta_ref" in ticks:
+        targets, wanted = _of_tendons(ticks, "target", motors.step_length), _columns(ticks, _WANTED)
+        if flexion and "theta_ref" in ticks:
             wanted = {"bend_z": wanted["bend_y"]}
-        motions.append(
-            RecordedMotion(
-                f"{number}",
-                _task_of_trial(row),
-                measured,
-                Stream(time, targets)
-                if (targets := _of_tendons(ticks, "target", motors.step_length)) and len(time)
-                else None,
-                Stream(time, wanted) if wanted and len(time) else None,
-                float((ticks.clock - ticks.time).iloc[0]) if {"clock", "time"} <= set(ticks) and len(ticks) else None,
-            )
-        )
+        asked, led = (Stream(time, columns) if columns and len(time) else None for columns in (targets, wanted))
+        begin = float((ticks.clock - ticks.time).iloc[0]) if {"clock", "time"} <= set(ticks) and len(ticks) else None
+        motions.append(RecordedMotion(f"{number}", _task_of_trial(row), measured, asked, led, begin))
     return motions
 
 
@@ -184,17 +170,32 @@ def _columns(table: pd.DataFrame, names: Mapping[str, str]) -> Columns:
 
 
 def _simulated(run: Run) -> list[RecordedMotion]:
-    """A simulated motion in one plane, with the spools of the four tendons where it has any."""
-    table, study = _whole(read_table(run.file("data/trajectory.csv")), "theta"), study_of(run)
-    columns, commands = _columns(table, _MOTION), Columns()
-    for tendon, side in zip(tendons_of("ulnar"), ("plus", "plus", "minus", "minus"), strict=True):
-        if f"tension_{side}" in table:
-            commands[f"tension_{tendon}"] = table[f"tension_{side}"].to_numpy(float)
-        if f"spool_{side}" in table:
-            columns[f"spool_{tendon}"] = table[f"spool_{side}"].to_numpy(float)
-            if _slides_freely(study.simulate.loop):
-                columns[f"tension_{tendon}"] = table[f"acting_{side}"].to_numpy(float)
-    return [_motion(run, table, columns, commands)]
+    """A simulated motion, with the spools of its tendons where it has any; with pulls where these are the spools' too.
+
+    In one plane a side's columns are of one tendon, in two planes a place's pull is of all of its tendons.
+    """
+    in_space, (study, _) = run.has("data/bends.csv"), study_of(run)
+    table = _whole(run.data("bends"), "bend_ulnar") if in_space else _whole(run.data("trajectory"), "theta")
+    columns, commands = _columns(table, _BENDS if in_space else _MOTION), Columns()
+    free, pull = _slides_freely(study.simulate.loop), "pull" if in_space else "tension"
+    sides = zip(("plus", "plus", "minus", "minus"), tendons_of("ulnar"), (1, 1, 1, 1), strict=True)
+    for column, number, alike in _numbered(study.wrist) if in_space else sides:
+        if f"{pull}_{column}" in table:
+            commands[f"tension_{number}"] = table[f"{pull}_{column}"].to_numpy(float) / alike
+        if f"spool_{column}" in table:
+            columns[f"spool_{number}"] = table[f"spool_{column}"].to_numpy(float)
+        if free and (in_space or f"spool_{column}" in table):
+            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / alike
+    settings, time = run.config.simulate, table.time.to_numpy(float)
+    return [
+        RecordedMotion(
+            "",
+            f"{settings.reference.kind} with {settings.controller}",
+            [Stream(time, columns)],
+            Stream(time, commands) if commands else None,
+            Stream(time, wanted) if (wanted := _columns(table, _WANTED)) else None,
+        )
+    ]
 
 
 def _whole(table: pd.DataFrame, bend: str) -> pd.DataFrame:
@@ -206,26 +207,6 @@ def _whole(table: pd.DataFrame, bend: str) -> pd.DataFrame:
     return table.iloc[:last]
 
 
-def _motion(run: Run, table: pd.DataFrame, columns: Columns, commands: Columns) -> RecordedMotion:
-    """The motion of a simulate run."""
-    settings, time = run.config.simulate, table.time.to_numpy(float)
-    return RecordedMotion(
-        "",
-        f"{settings.reference.kind} with {settings.controller}",
-        [Stream(time, columns)],
-        Stream(time, commands) if commands else None,
-        Stream(time, wanted) if (wanted := _columns(table, _WANTED)) else None,
-    )
-
-
-def study_of(run: Run) -> Study:
-    """The study of a simulate run, with the wrist, motors and sensor that were identified where they were."""
-    source = identified_in(run)
-    if source is None:
-        return run.config
-    return with_found(run.config, "simulate", found_in(source))
-
-
 def _slides_freely(loop: Loop) -> bool:
     """Whether a tendon pulls as much at its spool as at the wrist."""
     return not loop.actuator.winds or not loop.plant.actuator.of(loop.actuator).friction
@@ -233,27 +214,12 @@ def _slides_freely(loop: Loop) -> bool:
 
 def _tracked(run: Run) -> list[RecordedMotion]:
     """What one camera saw, or the bends that two cameras saw."""
-    table = read_table(run.file("data/track.csv"))
+    table = run.data("track")
     if "plane" in table:
         seen = _bends_seen(table[np.isfinite(table.bend)], "time")
     else:
         seen = [Stream(table.time.to_numpy(float), _columns(table, _MOTION))]
     return [RecordedMotion("", "recorded by hand or by another program", seen)]
-
-
-def _bends(run: Run) -> list[RecordedMotion]:
-    """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too."""
-    table, study = _whole(read_table(run.file("data/bends.csv")), "bend_ulnar"), study_of(run)
-    loop = study.simulate.loop
-    columns, commands = _columns(table, _BENDS), Columns()
-    for column, number, alike in _numbered(study.wrist):
-        if f"pull_{column}" in table:
-            commands[f"tension_{number}"] = table[f"pull_{column}"].to_numpy(float) / alike
-        if f"spool_{column}" in table:
-            columns[f"spool_{number}"] = table[f"spool_{column}"].to_numpy(float)
-        if _slides_freely(loop):
-            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / alike
-    return [_motion(run, table, columns, commands)]
 
 
 def _numbered(wrist: WristParameters) -> list[tuple[int, int, int]]:
@@ -270,16 +236,16 @@ def _numbered(wrist: WristParameters) -> list[tuple[int, int, int]]:
 
 def _compared(run: Run) -> list[RecordedMotion]:
     """Every motion of a comparison, by its number."""
-    arrays = read_arrays(run.file("data/trajectories.npz"))
+    arrays = run.array("trajectories")
     names = _MOTION if "theta" in arrays else _BENDS
-    shape = arrays["theta" if "theta" in arrays else "bend_ulnar"].shape
+    shape = arrays[next(iter(names))].shape
     over_time = {
         name: np.broadcast_to(values, shape).astype(float)
         for name, values in arrays.items()
         if values.shape in (shape, shape[-1:])
     }
     tasks = [f"motion {number}" for number in range(shape[0])]
-    if run.has("data/comparison.csv") and len(rows := read_table(run.file("data/comparison.csv"))) == shape[0]:
+    if run.has("data/comparison.csv") and len(rows := run.data("comparison")) == shape[0]:
         tasks = [f"{row.reference} with {row.controller}/{row.gains}, {row.loop}" for row in rows.itertuples()]
     sides = {"tension_plus": "tension_1", "tension_minus": "tension_2"}
     for column, tendon, alike in _numbered(run.config.wrist):
@@ -301,7 +267,7 @@ def _compared(run: Run) -> list[RecordedMotion]:
 
 def _loops(run: Run) -> list[RecordedMotion]:
     """Hysteresis loops by their numbers; tensions are those of one tendon."""
-    courses, motions = read_table(run.file("data/courses.csv")), list[RecordedMotion]()
+    courses, motions = run.data("courses"), list[RecordedMotion]()
     alike, names, bends = [TENDONS_PER_SIDE] * 2, ["plus", "minus"], {"bend_y": "theta"}
     if "given_plus" not in courses:  # of two planes
         alike = list(TendonLayout.of(run.config.wrist).multiplicity)
@@ -316,20 +282,14 @@ def _loops(run: Run) -> list[RecordedMotion]:
             columns[f"tension_{tendon}"] = table[f"spool_{name}"].to_numpy(float) / count
         columns |= {ours: table[theirs].to_numpy(float) for ours, theirs in bends.items()}
         time = table.time.to_numpy(float)
-        motions.append(
-            RecordedMotion(
-                f"{number}",
-                "hysteresis loop",
-                [Stream(time, columns)],
-                Stream(time, commands) if commands else None,
-            )
-        )
+        given = Stream(time, commands) if commands else None
+        motions.append(RecordedMotion(f"{number}", "hysteresis loop", [Stream(time, columns)], given))
     return motions
 
 
 def _transitions(run: Run) -> list[RecordedMotion]:
     """Random motions of `gen-data --source transitions`; none of a run of samples without time."""
-    arrays = read_arrays(run.file("data/samples.npz"))
+    arrays = run.array("samples")
     if not {"bend", "rate", "torque", "period"} <= set(arrays):
         return []
     motions = []
@@ -347,7 +307,7 @@ def _transitions(run: Run) -> list[RecordedMotion]:
 _READERS: Mapping[str, Callable[[Run], list[RecordedMotion]]] = {
     "log.csv": _trials,
     "trajectory.csv": _simulated,
-    "bends.csv": _bends,
+    "bends.csv": _simulated,
     "track.csv": _tracked,
     "trajectories.npz": _compared,
     "courses.csv": _loops,

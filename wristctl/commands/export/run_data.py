@@ -4,35 +4,36 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.commands.export.lerobot_data_set import write_data_set
 from wristctl.commands.export.model import viewed_chain
-from wristctl.commands.export.open_log_of_run import write_open_log
-from wristctl.commands.export.recorded_motions import motions_of
+from wristctl.commands.export.recorded_motions import Columns, Stream, motions_of
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import FILE, UserError
 from wristctl.records import Run
 from wristctl.records.files import replacing
-from wristctl.records.formats import read_arrays, read_table
+from wristctl.records.log_columns import units_of
+from wristctl.records.open_log import OpenLog, write_log
+from wristctl.records.recorded_table import INSTALL
 
 if TYPE_CHECKING:
     import pandas as pd
 
-INSTALL = "pip install 'wristctl[logs]'"
-
 
 def tables_of(run: Run) -> dict[str, pd.DataFrame]:
     """Every table of a run by its name: data/log.csv is log."""
-    return {file.stem: read_table(run.file(f"data/{file.name}")) for file in sorted((run.path / "data").glob("*.csv"))}
+    return {file.stem: run.data(file.stem) for file in sorted((run.path / "data").glob("*.csv"))}
 
 
 def arrays_of(run: Run) -> dict[str, dict[str, np.ndarray]]:
     """Every set of arrays of a run by its name."""
-    return {file.stem: read_arrays(run.file(f"data/{file.name}")) for file in sorted((run.path / "data").glob("*.npz"))}
+    return {file.stem: run.array(file.stem) for file in sorted((run.path / "data").glob("*.npz"))}
 
 
 def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
@@ -56,6 +57,47 @@ def export_run(run: Run, to: str, file: Path | None) -> Path:
     return path
 
 
+def open_log_of(run: Run) -> OpenLog:
+    """Motions of a run, one after the other. Raises UserError for a run that holds none."""
+    motions = motions_of(run)
+    parts = [_merged(motion.measured) for motion in motions]
+    names = list(dict.fromkeys(name for part in parts for name in part))
+    if len(parts) > 1:
+        names.sort(key=lambda name: (name != "time", name))
+    columns: dict[str, Array] = {
+        name: np.concatenate([part.get(name, np.full(len(part["time"]), np.nan)) for part in parts]) for name in names
+    }
+    if run.kind == "hw-run" and _mass_is_said(run):
+        columns["mass"] = np.full(len(columns["time"]), run.config.wrist.hand_mass)
+    trials = [np.full(len(part["time"]), motion.name) for motion, part in zip(motions, parts, strict=True)]
+    words = {"trial": np.concatenate(trials)} if any(motion.name for motion in motions) else {}
+    return OpenLog(run.path, "log", columns, words)
+
+
+def _mass_is_said(run: Run) -> bool:
+    """Whether somebody has said the hand's mass: of a rig of one's own the default is nobody's."""
+    default = WristParameters.model_fields["hand_mass"].default
+    return run.config.hw_run.rig is None or run.config.wrist.hand_mass != default
+
+
+def _merged(streams: Sequence[Stream]) -> Columns:
+    """Columns at times of their own as columns at all times, in their order; cells of other times are empty."""
+    time = np.unique(np.concatenate([stream.time for stream in streams]))
+    merged = {"time": time}
+    for stream in streams:
+        rows = np.searchsorted(time, stream.time)
+        for name, column in stream.columns.items():
+            if units_of(name) is None:
+                continue
+            merged[name] = np.full(len(time), np.nan)
+            merged[name][rows] = column
+    return merged
+
+
+def _csv(run: Run, path: Path) -> None:
+    write_log(open_log_of(run), path, FILE)
+
+
 def _mat(run: Run, path: Path) -> None:
     """A struct for each table and each set of arrays, `units` and `meaning` of the columns, `metrics`, `run`."""
     from scipy.io import savemat
@@ -64,41 +106,23 @@ def _mat(run: Run, path: Path) -> None:
         name: {str(key): _column(column) for key, column in table.items()} for name, table in tables_of(run).items()
     }
     data |= arrays_of(run)
-    columns = {name: columns_of(run, name) for name in data}
-    struct = {
-        "data": data,
-        "units": {
-            name: {key: unit for key, (unit, _) in table_columns.items()}
-            for name, table_columns in columns.items()
-            if table_columns
-        },
-        "meaning": {
-            name: {key: meaning for key, (_, meaning) in table_columns.items()}
-            for name, table_columns in columns.items()
-            if table_columns
-        },
-        "metrics": {name: _number(metric["value"]) for name, metric in run.metrics.items()},
-        "run": about(run),
-    }
+    described = {name: columns for name in data if (columns := columns_of(run, name))}
+    units, meaning = (
+        {name: {key: words[part] for key, words in columns.items()} for name, columns in described.items()}
+        for part in range(2)
+    )
+    values = {name: metric["value"] for name, metric in run.metrics.items()}
+    metrics = {name: np.nan if value is None else value for name, value in values.items()}
+    struct = {"data": data, "units": units, "meaning": meaning, "metrics": metrics, "run": about(run)}
+    named = _named(struct)
     with replacing(path, FILE) as temporary:
-        savemat(
-            str(temporary),
-            _named(struct),
-            appendmat=False,
-            long_field_names=True,
-            oned_as="column",
-            do_compression=True,
-        )
+        savemat(str(temporary), named, appendmat=False, long_field_names=True, oned_as="column", do_compression=True)
 
 
 def _column(values: Any) -> np.ndarray:
     """Numbers as they are, words as cells."""
     array: np.ndarray = values.to_numpy()
     return array if array.dtype.kind in "fiub" else np.array(values.fillna("").astype(str), object)
-
-
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _named(content: Any) -> Any:
@@ -140,7 +164,7 @@ def _mcap(run: Run, path: Path) -> None:
 
 # File ending and writer of each format.
 FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
-    "csv": (".csv", write_open_log),
+    "csv": (".csv", _csv),
     "mat": (".mat", _mat),
     "lerobot": ("-lerobot", write_data_set),
     "mcap": (".mcap", _mcap),

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from wristctl.commands.export.law_programs import Function
+from wristctl.commands.export.law_programs import Function, LawPrograms
 from wristctl.lanes.straight_line import Operation
 from wristctl.lanes.symbols import Line
 
@@ -17,7 +17,7 @@ _LOGIC = {"c": {"and": "&&", "or": "||"}, "numpy": {"and": "&", "or": "|"}}
 _BINDING = {"add": 1, "sub": 1, "mul": 2, "div": 2}
 _MASKS = ("lt", "le", "gt", "ge", "and", "or")
 # NumPy's names of functions that <math.h> calls otherwise.
-_NUMPY = {"fabs": "abs", "atan2": "arctan2", "pow": "power", "logb": "_logb"}
+_NUMPY = {"fabs": "np.abs", "atan2": "np.arctan2", "pow": "np.power", "logb": "_logb"}
 _ATOM, _LOOSE = 3, 0
 
 
@@ -41,12 +41,20 @@ def listed(values: Sequence[float]) -> str:
     return ", ".join(repr(float(value)) for value in values)
 
 
-def body(function: Function, language: Language) -> list[str]:
-    """Statements of a function: all values, by the lines of Python that they come from, and then what it writes."""
-    return _Writer(function, language).statements()
+def shared_words(programs: LawPrograms) -> dict[str, str]:
+    """Words of both languages' templates: names, sizes and numbers of a law."""
+    return {
+        "name": programs.name, "planes": str(programs.planes), "places": str(programs.places),
+        "reference": str(programs.of_a_plane * programs.planes), "period": repr(programs.period),
+        "of_a_plane": str(programs.of_a_plane), "memory": str(programs.memory),
+        "motor_start": listed(programs.motors), "withheld": str(2 * programs.places), "alike": listed(programs.alike),
+        "driven": programs.driven, "expected": str(programs.inputs),
+    }  # fmt: skip
 
 
 class _Writer:
+    """Statements of a function: all values, by the lines of Python that they come from, and then what it writes."""
+
     def __init__(self, function: Function, language: Language) -> None:
         self._language: Language = language
         self._operations, self._outputs = function.program.operations, function.program.outputs
@@ -58,7 +66,8 @@ class _Writer:
 
     def statements(self) -> list[str]:
         """All statements, without indentation."""
-        lines, last = list[str](), None
+        lines, last, in_c = list[str](), None, self._language == "c"
+        end = ";" * in_c
         for k in self._used:
             operation = self._operations[k]
             expression = self._expression(operation)
@@ -68,9 +77,9 @@ class _Writer:
             if operation.line != last:
                 last = operation.line
                 lines.append(self._comment(last))
-            lines.append(self._declared(k, operation.name, expression.text))
+            kind = f"const {'int' if operation.name in _MASKS else 'double'} " if in_c else ""
+            lines.append(f"{kind}t{k} = {expression.text}{end}")
             self._expressions[k] = _Expression(f"t{k}", _ATOM)
-        end = ";" if self._language == "c" else ""
         # what is passed on unchanged needs no statement
         written = {name: self._expressions[k].text for name, k in self._outputs.items()}
         return lines + [f"{name} = {text}{end}" for name, text in written.items() if text != name]
@@ -79,21 +88,12 @@ class _Writer:
         operation = self._operations[k]
         if operation.name == "const":
             return False
-        if operation.name == "input":
-            return "[" in operation.value and self._is_overwritten(k)
+        if operation.name == "input":  # an entry of an array that is written before another result that needs it
+            value, others = operation.value, self._outputs.items()
+            return "[" in value and k in self._given and any(name != value and at == k for name, at in others)
         if self._uses[k] != 1 or k in self._given or len(expression.text) > _LONGEST:
             return True
         return self._operations[self._users[k]].line != operation.line
-
-    def _is_overwritten(self, k: int) -> bool:
-        """Whether an entry of an array is written before another result that needs it."""
-        value = self._operations[k].value
-        return k in self._given and any(name != value and at == k for name, at in self._outputs.items())
-
-    def _declared(self, k: int, name: str, text: str) -> str:
-        if self._language == "numpy":
-            return f"t{k} = {text}"
-        return f"const {'int' if name in _MASKS else 'double'} t{k} = {text};"
 
     def _comment(self, line: Line | None) -> str:
         words = f"{line.file}:{line.number}: {line.text}" if line else "as it was"
@@ -119,11 +119,9 @@ class _Writer:
             return _Expression(f"{self._bound(parts[0], 1)} {sign} {self._bound(parts[1], 1)}", _LOOSE)
         if name in _INFIX:
             binding = _BINDING.get(name, _LOOSE)
-            right = binding + 1
-            return _Expression(
-                f"{self._bound(parts[0], binding or 1)} {_INFIX[name]} {self._bound(parts[1], right)}", binding
-            )
-        called = name if language == "c" else _named(name)
+            left, right = self._bound(parts[0], binding or 1), self._bound(parts[1], binding + 1)
+            return _Expression(f"{left} {_INFIX[name]} {right}", binding)
+        called = name if language == "c" else _NUMPY.get(name, f"np.{name}")
         return _Expression(f"{called}({', '.join(part.text for part in parts)})", _ATOM)
 
     @staticmethod
@@ -131,24 +129,15 @@ class _Writer:
         return part.text if part.binding >= binding else f"({part.text})"
 
 
-def _named(name: str) -> str:
-    other = _NUMPY.get(name, name)
-    return other if other.startswith("_") else f"np.{other}"
-
-
 def c_function(name: str, function: Function) -> str:
     """A static function of C with this name; arrays that it only reads are const."""
     parameters = [f"{'' if array in function.written else 'const '}double *{array}" for array in function.arrays]
-    lines = body(function, "c")
+    lines = _Writer(function, "c").statements()
     lines += [f"(void){array};" for array in function.arrays if not any(f"{array}[" in line for line in lines)]
-    return "\n".join([f"static void {name}({', '.join(parameters)})", "{", *_indented(lines), "}"])
+    return "\n".join([f"static void {name}({', '.join(parameters)})", "{", *(f"    {line}" for line in lines), "}"])
 
 
 def numpy_function(name: str, function: Function) -> str:
     """A function of Python with this name, which writes into the arrays that are its results."""
-    lines = body(function, "numpy") or ["pass"]
-    return "\n".join([f"def {name}({', '.join(function.arrays)}):", *_indented(lines)])
-
-
-def _indented(lines: Sequence[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+    lines = _Writer(function, "numpy").statements() or ["pass"]
+    return "\n".join([f"def {name}({', '.join(function.arrays)}):", *(f"    {line}" for line in lines)])

@@ -1,19 +1,47 @@
-"""Rows of a log in the order of their times: what stands twice goes, and a clock that starts again starts a trial."""
+"""Logs mended before a look at them: counters that wrap go on, rows that stand twice go, all in the order of times.
+
+A clock that starts again starts a trial.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from wristctl.arrays import Array
 from wristctl.errors import UserError
+from wristctl.records.column_ranges import counter_of
 from wristctl.records.open_log import OpenLog
 
 # Rows within which one that stands twice, or out of order, is a slip of the recorder, not the start of another trial.
 _NEAR = 50
+
+
+def without_wraps(log: OpenLog) -> OpenLog:
+    """The log with spools and times that count on where a whole counter begins again, which its remarks say.
+
+    A column is a counter where its numbers are whole, all in the range of 16 or 32 bits, signed or not, and where its
+    largest steps are that range within a tenth while all others are below a tenth of it.
+    """
+    columns, told = dict(log.columns), list[str]()
+    for name, scale in log.scales.items():
+        if name not in columns or (name != "time" and not name.startswith("spool_")):
+            continue
+        there = np.flatnonzero(np.isfinite(columns[name]))
+        counts = columns[name][there] / scale
+        if len(there) < 3 or (counter := counter_of(counts)) is None:
+            continue
+        size, turns = counter
+        columns[name] = columns[name].copy()
+        columns[name][there] = scale * (np.round(counts) + size * turns)
+        wraps = np.flatnonzero(np.diff(turns)) + 1
+        where = log.place(int(there[wraps[0]]))
+        more = f", {len(wraps)} times in all" if len(wraps) > 1 else ""
+        power = size.bit_length() - 1
+        told.append(f"{log.head(name)} begins again after 2^{power} counts at {where}{more}: it is taken to go on.")
+    return replace(log, columns=columns, remarks=[*log.remarks, *told]) if told else log
 
 
 def without_repeats(log: OpenLog) -> OpenLog:
@@ -35,7 +63,7 @@ def without_repeats(log: OpenLog) -> OpenLog:
         # Of two rows that are apart, the one that is out of order goes.
         early = earlier + 1 < later and time[earlier + 1] < time[earlier]
         kept[earlier if early else later] = False
-    first = place_of(log, int(np.flatnonzero(~kept)[0]))
+    first = log.place(int(np.flatnonzero(~kept)[0]))
     remark = f"{np.sum(~kept)} rows that stand twice, with their time, are used once; the first is at {first}."
     return replace(log.only(kept), remarks=[*log.remarks, remark])
 
@@ -55,7 +83,7 @@ def parted(log: OpenLog) -> OpenLog:
             starts += of_trial
     if not starts:
         return log
-    places = ", ".join(place_of(log, row) for row in sorted(starts)[:3])
+    places = ", ".join(log.place(row) for row in sorted(starts)[:3])
     count = len(set(parts.tolist()))
     remark = f"The clock starts again at {places}: each start is a trial of its own, {count} in all."
     return replace(log, words={**log.words, "trial": parts.astype(str)}, remarks=[*log.remarks, remark])
@@ -106,14 +134,6 @@ def in_order(log: OpenLog) -> OpenLog:
         order[rows] = rows[sorted_rows]
     if not moved:
         return log
-    columns = {name: column[order] for name, column in log.columns.items()}
-    words = {name: column[order] for name, column in log.words.items()}
-    lines = np.asarray(log.lines)[order].tolist() if log.lines else ()
-    first = place_of(log, moved[0])
+    first = log.place(moved[0])
     remark = f"{len(moved)} rows that come late are put in the order of their times; the first is at {first}."
-    return replace(log, columns=columns, words=words, lines=lines, remarks=[*log.remarks, remark])
-
-
-def place_of(log: OpenLog, row: int) -> str:
-    """File's name and line of a row, for sentences."""
-    return Path(log.at(row)).name
+    return replace(log.only(order), remarks=[*log.remarks, remark])
