@@ -33,11 +33,16 @@ class Candidate(NamedTuple):
 
 
 def spread(errors: Array) -> tuple[float, float, float]:
-    """Error [rad] that 2.5, 50 and 97.5 of 100 rigs stay below."""
+    """Ends of the range in which another rig errs with a probability of 95 % [rad], and the median between them.
+
+    Of n rigs drawn alike another one stays below the k-th smallest with a probability of k/(n + 1). Of fewer than 39
+    rigs the ends are the least and the largest error.
+    """
     import numpy as np
 
-    low, median, high = np.percentile(errors, (2.5, 50.0, 97.5), method="nearest")
-    return float(low), float(median), float(high)
+    ordered = np.sort(errors)
+    first = max(0, int(0.025 * (len(ordered) + 1)) - 1)
+    return float(ordered[first]), float(np.median(ordered)), float(ordered[-1 - first])
 
 
 def share_of(count: int) -> str:

@@ -14,6 +14,10 @@ from wristctl.config.families import Drawn, Family, Range
 from wristctl.config.recommend import DELAY, MEASURED, known_delay
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from wristctl.arrays import Array
     from wristctl.config.loop import Reference
     from wristctl.config.study import Study
 
@@ -46,7 +50,7 @@ FACTS = (
     Fact(
         "mass in the hand and the push on it",
         ("plant.hand_mass", "plant.payload", "disturbances.load"),
-        "wrist.hand_mass, recommend.draw",
+        "wrist.hand_mass, recommend.known",
     ),
     Fact("delay and noise of the camera", (DELAY, "plant.sensor.noise_deg"), IDENTIFIED),
 )
@@ -87,7 +91,10 @@ class Expected(NamedTuple):
         """The range, the rigs that it is not of, and what would narrow it, in sentences."""
         counted = self.rigs - self.at_limit - self.failed
         share = f"{share_of(counted)}{' other' * (counted < self.rigs)} simulated rigs"
-        within = f"With that motion {share} err by {degrees(self.low)} to {degrees(self.high)} deg."
+        within = (
+            f"With that motion {share} err by {degrees(self.low)} to {degrees(self.high)} deg, half by at most "
+            f"{degrees(self.median)} deg."
+        )
         lost = [f"on {self.at_limit} of {self.rigs} rigs the motors are at their limit"] * bool(self.at_limit)
         lost += [f"on {self.failed} of {self.rigs} the wrist fails"] * bool(self.failed)
         words = [f"{capital(joined(lost))}."] * bool(lost) + [within] * bool(counted)
@@ -162,8 +169,24 @@ def _narrower(source: Drawn, measured: str) -> Drawn:
     return source if wide[0] <= wide[1] else measured
 
 
-def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
-    """The root of the mean square of a rig's errors over the motions, over all rigs that can follow."""
+class Rigs(NamedTuple):
+    """How simulated rigs follow, (R,) each."""
+
+    errors: Array
+    """Root of the mean square of a rig's errors over the motions [rad]."""
+    failed: NDArray[np.bool_]
+    at_limit: NDArray[np.bool_]
+    """Whether its motors stand at their limit, so that the wrist falls short."""
+
+    @property
+    def following(self) -> Array:
+        """Errors of those that can follow."""
+        errors: Array = self.errors[~self.failed & ~self.at_limit]
+        return errors
+
+
+def rigs_asked(study: Study, best: Candidate, asked: Family) -> Rigs:
+    """How the test's rigs follow the motions with these gains."""
     import numpy as np
 
     from wristctl.control.table import controller
@@ -173,9 +196,14 @@ def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
     law, tests = controller(best.controller), study.recommend.tests
     cases = drawn_cases(asked, FAMILY, "test", study.seed, tests, study.wrist)
     measured = measure(law, np.array([law.values(best.gains)]), cases, study.wrist, ["rmse", "saturation"])
-    failed = measured.failed.reshape(tests, -1).any(axis=1)
-    at_limit = (measured.metrics["saturation"].reshape(tests, -1) > _AT_LIMIT).any(axis=1) & ~failed
+    failed = np.any(measured.failed.reshape(tests, -1), axis=1)
+    at_limit = np.any(measured.metrics["saturation"].reshape(tests, -1) > _AT_LIMIT, axis=1) & ~failed
     errors = np.sqrt((measured.metrics["rmse"].reshape(tests, -1) ** 2).mean(axis=1))
-    sound = errors[~failed & ~at_limit]
-    ends = spread(sound) if len(sound) else (math.nan,) * 3
-    return Expected(*ends, tests, int(at_limit.sum()), int(failed.sum()))
+    return Rigs(errors, failed, at_limit)
+
+
+def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
+    """The error over all rigs that can follow."""
+    rigs = rigs_asked(study, best, asked)
+    ends = spread(rigs.following) if len(rigs.following) else (math.nan,) * 3
+    return Expected(*ends, len(rigs.errors), int(rigs.at_limit.sum()), int(rigs.failed.sum()))
