@@ -6,10 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 import wristctl
 from wristctl.commands.identify.command import _problem
 from wristctl.commands.inputs_of_loops import Found, with_found
+from wristctl.commands.recommend.reach import family_of_rigs
 from wristctl.commands.recommend.rehearsals import _asked
 from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of
 from wristctl.errors import UserError
@@ -57,6 +59,34 @@ def test_the_emulated_rig_has_the_tendons_and_the_camera_that_were_identified() 
     fast = wristctl.load_study(None, "recommend.loop.control_period=2.0e-3", "recommend.loop.sensor.frame_rate=500")
     camera = _asked(fast, [], 20.0, 1, 1.0).bench.camera
     assert camera.frame_rate == 500.0 and camera.exposure * camera.frame_rate <= 1.0
+
+
+def test_trials_wind_by_the_stretch_that_homing_measures_unless_a_study_says_otherwise() -> None:
+    """Simulated rigs are homed as the trial's is; one that is simulated alone, or a robot of one's own, is not."""
+
+    def of(*words: str) -> tuple[Any, bool]:
+        study = wristctl.load_study(None, *words)
+        sections: Any = sections_of(study, 20.0)
+        return sections.get("hw_run", {}).get("homing"), family_of_rigs(study, 20.0).homed
+
+    assert of() == ({"stretch": "measured"}, True)
+    assert of("hw-run.homing.frames=7") == ({"frames": 7, "stretch": "measured"}, True)
+    assert _asked(wristctl.load_study(None, "hw-run.homing.frames=7"), [], 20.0, 1, 1.0).homing.frames == 7
+    assert of("hw-run.homing.stretch=measured") == ({"stretch": "measured"}, True)
+    assert of("hw-run.homing.stretch=believed") == (None, False)
+    assert of("recommend.loop.sensor.level=ideal") == (None, False) == of("hw-run.rig=servos")
+
+
+def test_what_is_known_of_a_rig_takes_the_place_of_what_is_drawn_of_any_and_leaves_the_rest() -> None:
+    usual = wristctl.load_study(None).recommend
+    stated = wristctl.load_study(None, "recommend.known={plant.hand_mass: x1..1.05, plant.payload: 0..0.1}").recommend
+    weights = {"plant.hand_mass": "x1..1.05", "plant.payload": "0..0.1"}
+    assert stated.family(20.0).draw == usual.family(20.0).draw | weights
+    assert stated.measured().family(20.0).draw == usual.measured().family(20.0).draw | weights
+    wide = wristctl.load_study(None, "recommend.known={plant.stiffness: x0.5..2}").recommend
+    assert wide.measured().drawn["plant.stiffness"] == "x0.5..2", "what somebody says stays"
+    with pytest.raises(ValidationError, match="no such leaf"):
+        wristctl.load_study(None, "recommend.known={plant.hand_weight: x1..1.05}").recommend.family(20.0)
 
 
 def test_the_trial_of_a_wrist_whose_trials_are_on_a_robot_of_ones_own_names_it() -> None:

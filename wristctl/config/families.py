@@ -79,6 +79,11 @@ class Family(Section):
     together: tuple[dict[str, float], ...] = choice(
         (), "rows of settings that are drawn together, one row a world, as an identification's posterior has them"
     )
+    homed: bool = choice(
+        False,
+        "whether controllers know of each world what check and homing of a rig measure: how far tendons stretch for a "
+        "bend, and how old pictures are",
+    )
     references: tuple[Reference, ...] = choice((Reference(),), "motions, each followed in every world", min_length=1)
     horizon: float = quantity(3.0, "s", "duration of one rollout", "assumed", gt=0)
     about: str = choice("", "what is asked of a controller here, in a few words")

@@ -25,7 +25,6 @@ RAMPS = 1000.0, 200_000.0
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
 
-
 # What of an actuator host and board do by themselves, whatever hangs on them.
 _OF_THE_BOARD = ("step_rate", "step_acceleration", "ramp", "command_delay", "update")
 
@@ -54,6 +53,9 @@ class Homing(Section):
         20.0, "deg", "in two planes: how far from its place a tendon may bend the wrist", "assumed", gt=0, lt=45
     )
     sticks: float = quantity(0.3e-3, "m", "path between reeling in and letting go: friction", "assumed", gt=0)
+    stretch: Literal["believed", "measured"] = choice(
+        "believed", "of the tendons, by which trials wind: as believed, or by the steps per radian that homing takes"
+    )
 
 
 class Safety(Section):

@@ -90,6 +90,10 @@ class RecommendSettings(Section):
     draw: dict[str, Drawn] = choice(
         _DRAWN, "settings of the loop in which simulated rigs differ, and what each is drawn from"
     )
+    known: dict[str, Drawn] = choice(
+        {},
+        "settings that are known of this rig, {plant.hand_mass: x1..1.05}, in place of what is drawn of any",
+    )
     references: tuple[Reference, ...] = choice(
         _MOTIONS,
         "motions that each simulated rig follows, to angles drawn within its reach; by default squares at a drawn "
@@ -139,9 +143,14 @@ class RecommendSettings(Section):
             draw[DELAY] = known_delay(self.loop)
         return self.model_copy(update={"draw": draw})
 
+    @property
+    def drawn(self) -> dict[str, Drawn]:
+        """All that is drawn of a rig: what is known of it takes the place of what is drawn of any."""
+        return self.draw | self.known
+
     def family(self, largest_deg: float, planes: int = 1) -> Family:
         """The simulated rigs, asked for angles of up to `largest_deg` to both sides, in two planes to any side."""
-        drawn: dict[str, Drawn] = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
+        drawn: dict[str, Drawn] = self.drawn | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
         references = self.references
         if references == _MOTIONS:
             slow, fast = (share * largest_deg for share in _SPEEDS)

@@ -65,5 +65,7 @@ def cameras_of(
     )  # fmt: skip
     pictures = np.zeros((blocks, taken.shape[1], planes, *wide))
     turn = np.zeros((blocks, 2, order.size // blocks), np.int64)
-    arriving = np.zeros((blocks, planes + 2, *wide))
+    arriving = np.zeros((blocks, planes + 3, *wide))
+    late = np.array([[worlds[index].loop.plant.sensor.dated_late] for index in which])
+    arriving[:, planes + 2] = spread(late, count)[:, 0]
     return Watch(by_block.reshape(*by_block.shape[:3], *wide), pictures, turn, arriving, observer), frames

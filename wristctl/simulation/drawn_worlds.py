@@ -4,6 +4,8 @@ Another leaf, reference or world changes nothing for those that were there. What
 are draws of different names.
 """
 
+from statistics import NormalDist
+
 import numpy as np
 
 from wristctl.config.families import TOGETHER, Family
@@ -11,10 +13,16 @@ from wristctl.config.loop import Loop, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
 from wristctl.simulation.cases import Case
+from wristctl.simulation.homed_worlds import homed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.wrist.kinematics import Inverse
 
+# Names of the streams by which homing and the check of a rig err.
+_HOMED = "homing", "check"
+# By how much later than they were taken the check of a rig leaves pictures dated [s]: an age of less than 5 ms stays as
+# it is, and what its model leaves out adds up to 3 to others (docs/hardware/camera.md).
+_DATED_LATE = -3e-3, 5e-3
 # A share at which no interval that is given in round numbers has its middle, an end, or a right angle.
 _WITHIN = 0.382
 
@@ -25,11 +33,21 @@ def world_of(family: Family, name: str, split: str, seed: int, number: int) -> L
     return family.world({key: _share(stream(seed, _leaf(split, name, key)), number) for key in keys})
 
 
+def believed_world_of(family: Family, name: str, split: str, seed: int, number: int, wrist: WristParameters) -> Loop:
+    """`world_of`; of a family whose worlds are homed with what its controller then knows of it."""
+    loop = world_of(family, name, split, seed, number)
+    if not family.homed:
+        return loop
+    share, place = (_share(stream(seed, _leaf(split, name, key)), number) for key in _HOMED)
+    error, (least, most) = NormalDist().inv_cdf(min(max(share, 1e-12), 1.0 - 1e-12)), _DATED_LATE
+    return homed(wrist, loop, error, least + place * (most - least))
+
+
 def streams_of(family: Family, name: str, split: str) -> list[str]:
     """The names of the streams that its worlds are drawn from."""
     numbers = range(len(family.references))
     leaves = [_leaf(split, name, key) for key in family.draw if not key.startswith("reference.")]
-    leaves += [_leaf(split, name, TOGETHER)] * bool(family.together)
+    leaves += [_leaf(split, name, key) for key in (TOGETHER,) * bool(family.together) + _HOMED * family.homed]
     motions = [
         _leaf(split, name, key, number) for key in family.draw for number in numbers if key in family.drawn_of(number)
     ]
@@ -66,7 +84,7 @@ def drawn_cases(
     planes = planes_of(wrist, asked_of(family))
     cases, motions, cell = list[Case](), dict[tuple[str, float], Motion](), 0
     for world in range(first, first + draws):
-        loop = world_of(family, name, split, seed, world)
+        loop = believed_world_of(family, name, split, seed, world, wrist)
         period = sample_period(loop.control_period)
         for number in range(len(family.references)):
             shares = {

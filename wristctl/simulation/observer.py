@@ -72,7 +72,8 @@ class NoCamera(NamedTuple):
 
 class Watch(NamedTuple):
     """One block's camera: what is added to each frame's bends and whether it is seen (F, P + 1), pictures taken (F, P),
-    each lane's next frame to take and to arrive, `turn` (2, lanes); rows (P + 2,) to work on, and the observer."""
+    each lane's next frame to take and to arrive, `turn` (2, lanes); rows (P + 3,) to work on, of which the last stays:
+    by how much later than at its tick a frame is dated [s]; and the observer."""
 
     readings: Any
     pictures: Any
@@ -144,7 +145,7 @@ def _sample(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, h: fl
     frames, lanes = schedule.captures.shape
     readings = watch.readings.reshape(frames, planes + 1, lanes)
     pictures = watch.pictures.reshape(frames, planes, lanes)
-    rows, arriving = rows_of(watch.arriving), watch.arriving.reshape(planes + 2, lanes)
+    rows, arriving = rows_of(watch.arriving), watch.arriving.reshape(planes + 3, lanes)
     newest = watch.observer.at.reshape(lanes)
     shown = lanes_like(bend)
     for p in range(planes):
@@ -169,7 +170,7 @@ def _sample(watch: Any, schedule: Any, knowing: Any, tick: int, bend: Any, h: fl
     if last >= 0:
         for p in range(planes):
             shown[p] = rows[2 + p]
-        frame = ArrivingFrame(rows[0], 0.0, shown, rows[1])
+        frame = ArrivingFrame(rows[0], rows[2 + planes], shown, rows[1])
         fuse(watch.observer, knowing, (begin, first, last, tick), frame, h)
 
 

@@ -116,9 +116,10 @@ class BoardStand:
         settings, plane, pose = self._settings, self._plane, self.poses.get(self._plane)
         drive = BoardDrive(self._board, settings, self._signs)
         expected = ExpectedMoves(settings, self._wrist, plane, self._layout)
-        stiffness = expected.tendon_stiffness(self.zero.steps_per_radian)
-        oblique = 0.0 if pose is None else pose.oblique
-        return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness)
+        steps = self.zero.steps_per_radian
+        stiffness, oblique = expected.tendon_stiffness(steps), 0.0 if pose is None else pose.oblique
+        wound_by = expected.measured_stiffness(steps) if settings.homing.stretch == "measured" else None
+        return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness, wound_by)
 
     @property
     def _signs(self) -> tuple[int, ...]:

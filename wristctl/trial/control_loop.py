@@ -74,6 +74,8 @@ class AtZero(NamedTuple):
     """By load cells."""
     stiffness: float | None = None
     """Of the tendons [N/m] where homing has measured less than is believed."""
+    wound_by: float | None = None
+    """Stiffness of the tendons by which spools wind [N/m], where that is what homing has measured."""
 
 
 class ControlLoop:
@@ -83,11 +85,14 @@ class ControlLoop:
         self, ready: AtZero, settings: HwRunSettings, wrist: WristParameters, timing: TickTiming, log: TrialLog,
         shown: Shown | None = None, layout: TendonLayout | None = None,
     ) -> None:  # fmt: skip
-        drive, self._tracking, plane, oblique, pulls, stiffness = ready
+        drive, self._tracking, plane, oblique, pulls, stiffness, wound_by = ready
+        actuator = settings.actuator
+        if wound_by is not None:
+            actuator = actuator.model_copy(update={"tendon_stiffness": wound_by})
         self._drive, self._log, self._timing, self._shown = drive, log, timing, shown
         self._period, self._stale, self._tendons = timing.period, settings.safety.stale, numbers_of(layout)
-        self._spools = spools_of(settings.actuator)
-        self._belief = RigBelief(wrist, settings.actuator, names_of_planes(settings.planes, plane), layout)
+        self._spools = spools_of(actuator)
+        self._belief = RigBelief(wrist, actuator, names_of_planes(settings.planes, plane), layout)
         self._steering = Steering(self._belief, settings.sensor, timing.period)
         self._pulls = pulls
         self.watch = Watch(settings, wrist, plane, timing, oblique, pulls, stiffness, layout)

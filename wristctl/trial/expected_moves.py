@@ -16,8 +16,8 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Reading
 from wristctl.wrist.directions import OPPOSITE_AXES, away_of, in_plane
+from wristctl.wrist.lone_tendons import bends_alone, stiffness_by_length
 from wristctl.wrist.out_of_plane import across_of
-from wristctl.wrist.spatial.spatial_segments import ellipse
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Springs that are stiffer than believed and friction may ask for so many times the pull that the model says, and with
@@ -99,23 +99,6 @@ def _of_layout(wrist: WristParameters, layout: TendonLayout, planes: int) -> _Al
     return _Alone(sides, path / seen, np.ones(len(path)), sizes * seen)
 
 
-def bends_alone(wrist: WristParameters, places: Array) -> tuple[Array, Array, Array]:
-    """A small bend of a slack wrist by one tendon alone, of each at its place c (T, 2) [m].
-
-    It bends the wrist by K^-1 c T for a pull T, which takes c.K^-1 c T off its path. Returns where to, unit vectors
-    (T, 2); what a radian takes off the path (T,) [m/rad]; and the bend by a newton (T,) [rad/N].
-    """
-    along, across = wrist.stiffness, wrist.stiffness * wrist.flexion_ratio
-    yy, yz, zz = ellipse(along, across, math.radians(wrist.stiffness_axis_deg))
-    sinking = [across_of(in_plane(wrist, plane), (0,) * AXES).stiffness for plane in PLANES]
-    springs = np.array([[yy, yz], [yz, zz]])
-    springs[np.diag_indices(2)] += np.array(sinking) - [in_plane(wrist, plane).stiffness for plane in PLANES]
-    bends = np.linalg.solve(springs, places.T).T
-    sizes = np.hypot(*bends.T)
-    toward = bends / sizes[:, None]
-    return toward, (places * toward).sum(axis=1), sizes
-
-
 def _turns(toward: Array) -> tuple[tuple[int, ...], ...]:
     """Pairs of axes of which each is the one most opposite to the other; axes without one alone."""
     against = np.argmin(toward @ toward.T, axis=1).tolist()
@@ -186,6 +169,15 @@ class ExpectedMoves:
         if stretch <= self.steps() - rigid:
             return believed
         return max(self._softest, believed * (self.steps() - rigid) / stretch)
+
+    def measured_stiffness(self, steps: Sequence[float]) -> float:
+        """Stiffness [N/m] of tendons on the believed wrist that take the steps per radian (T,) which homing took.
+
+        Springs, tendons, their friction and pulleys that differ from what is believed all come in as stretch, so that
+        spools wind as far as this wrist asks for a bend; within `stiffness_by_length`.
+        """
+        rigid, believed = self.steps(math.inf), self._spools.stiffness
+        return stiffness_by_length(believed, believed * (self.steps() - rigid), float(np.mean(steps)) - rigid)
 
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist against a reading of the straight wrist."""

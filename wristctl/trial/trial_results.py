@@ -20,6 +20,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
 from wristctl.simulation.closed_loop import asked_of, repeat, scenario_of
 from wristctl.simulation.error_ellipse import ErrorEllipse, error_ellipse
+from wristctl.simulation.homed_worlds import homed
 from wristctl.simulation.live_reference import recorded
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.motion import Motion
@@ -299,6 +300,8 @@ def twin(
         wrist, loop = in_pairs(wrist, layout, loop or settings.loop)
         study = study.model_copy(update={"wrist": wrist})
     asked = (loop or settings.loop).model_copy(update={"disturbances": trial.disturbances(settings, followed)})
+    if settings.homing.stretch == "measured":
+        asked = homed(wrist, asked)
     if settings.planes == 1:  # the wrist may leave the plane in which its rig bends
         move = {"reference": settings.reference, "direction": trial.direction, "horizon": settings.horizon}
         chosen = study.simulate.model_copy(update={"loop": asked, **move})

@@ -14,6 +14,9 @@ from wristctl.config.recommend import DELAY, MEASURED, known_delay
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from wristctl.arrays import Array
 
 
@@ -46,11 +49,16 @@ class Candidate(NamedTuple):
 
 
 def spread(errors: Array) -> tuple[float, float, float]:
-    """Error [rad] that 2.5, 50 and 97.5 of 100 rigs stay below."""
+    """Ends of the range in which another rig errs with a probability of 95 % [rad], and the median between them.
+
+    Of n rigs drawn alike another one stays below the k-th smallest with a probability of k/(n + 1). Of fewer than 39
+    rigs the ends are the least and the largest error.
+    """
     import numpy as np
 
-    low, median, high = np.percentile(errors, (2.5, 50.0, 97.5), method="nearest")
-    return float(low), float(median), float(high)
+    ordered = np.sort(errors)
+    first = max(0, int(0.025 * (len(ordered) + 1)) - 1)
+    return float(ordered[first]), float(np.median(ordered)), float(ordered[-1 - first])
 
 
 def share_of(count: int) -> str:
@@ -87,7 +95,7 @@ FACTS = (
     Fact(
         "mass in the hand and the push on it",
         ("plant.hand_mass", "plant.payload", "disturbances.load"),
-        "wrist.hand_mass, recommend.draw",
+        "wrist.hand_mass, recommend.known",
     ),
     Fact("delay and noise of the camera", (DELAY, "plant.sensor.noise_deg"), IDENTIFIED),
 )
@@ -128,7 +136,10 @@ class Expected(NamedTuple):
         """The range, the rigs that it is not of, and what would narrow it, in sentences."""
         counted = self.rigs - self.at_limit - self.failed
         share = f"{share_of(counted)}{' other' * (counted < self.rigs)} simulated rigs"
-        within = f"With that motion {share} err by {degrees(self.low)} to {degrees(self.high)} deg."
+        within = (
+            f"With that motion {share} err by {degrees(self.low)} to {degrees(self.high)} deg, half by at most "
+            f"{degrees(self.median)} deg."
+        )
         lost = [f"on {self.at_limit} of {self.rigs} rigs the motors are at their limit"] * bool(self.at_limit)
         lost += [f"on {self.failed} of {self.rigs} the wrist fails"] * bool(self.failed)
         words = [f"{capital(joined(lost))}."] * bool(lost) + [within] * bool(counted)
@@ -205,8 +216,24 @@ def _narrower(source: Drawn, measured: str) -> Drawn:
     return source if wide[0] <= wide[1] else measured
 
 
-def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
-    """The root of the mean square of a rig's errors over the motions, over all rigs that can follow."""
+class Rigs(NamedTuple):
+    """How simulated rigs follow, (R,) each."""
+
+    errors: Array
+    """Root of the mean square of a rig's errors over the motions [rad]."""
+    failed: NDArray[np.bool_]
+    at_limit: NDArray[np.bool_]
+    """Whether its motors stand at their limit, so that the wrist falls short."""
+
+    @property
+    def following(self) -> Array:
+        """Errors of those that can follow."""
+        errors: Array = self.errors[~self.failed & ~self.at_limit]
+        return errors
+
+
+def rigs_asked(study: Study, best: Candidate, asked: Family) -> Rigs:
+    """How the test's rigs follow the motions with these gains."""
     import numpy as np
 
     from wristctl.control.table import controller
@@ -216,9 +243,14 @@ def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
     law, tests = controller(best.controller), study.recommend.tests
     cases = drawn_cases(asked, FAMILY, "test", study.seed, tests, study.wrist)
     measured = measure(law, np.array([law.values(best.gains)]), cases, study.wrist, ["rmse", "saturation"])
-    failed = measured.failed.reshape(tests, -1).any(axis=1)
-    at_limit = (measured.metrics["saturation"].reshape(tests, -1) > _AT_LIMIT).any(axis=1) & ~failed
+    failed = np.any(measured.failed.reshape(tests, -1), axis=1)
+    at_limit = np.any(measured.metrics["saturation"].reshape(tests, -1) > _AT_LIMIT, axis=1) & ~failed
     errors = np.sqrt((measured.metrics["rmse"].reshape(tests, -1) ** 2).mean(axis=1))
-    sound = errors[~failed & ~at_limit]
-    ends = spread(sound) if len(sound) else (math.nan,) * 3
-    return Expected(*ends, tests, int(at_limit.sum()), int(failed.sum()))
+    return Rigs(errors, failed, at_limit)
+
+
+def _over_rigs(study: Study, best: Candidate, asked: Family) -> Expected:
+    """The error over all rigs that can follow."""
+    rigs = rigs_asked(study, best, asked)
+    ends = spread(rigs.following) if len(rigs.following) else (math.nan,) * 3
+    return Expected(*ends, len(rigs.errors), int(rigs.at_limit.sum()), int(rigs.failed.sum()))

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
+from wristctl.commands.recommend.study_file import own_rig, trial_of
 from wristctl.config.choices import RIGS
 from wristctl.config.families import Drawn, Family
 from wristctl.config.hw_run import HwRunSettings
@@ -117,13 +118,14 @@ def narrowed(study: Study, told: Collection[str] | None) -> Study:
 
 
 def on_the_rig(study: Study) -> Study:
-    """The study as `hw-run` simulates its trials on a robot of one's own; any other as it is.
+    """The study as `hw-run` simulates its trials; one that is simulated alone as it is.
 
-    Tensions stay below what its motors hold. In one plane models have two tendons on either side, in place of as many
-    as it has.
+    Tensions stay below what the motors hold. On a robot of one's own models in one plane have two tendons on either
+    side, in place of as many as it has.
     """
     if study.recommend.rig is None:
-        return study
+        on_the_board = own_rig(study) is None and trial_of(study) == "hw-run"
+        return study.model_copy(update={"wrist": spared(study.wrist, study.hw_run)}) if on_the_board else study
     trials, settings = _trials(study), study.recommend
     wrist, loop = spared(study.wrist, trials), settings.loop
     layout = layout_of_rig(trials, wrist)

@@ -6,11 +6,12 @@ import math
 
 from wristctl.commands.recommend.expected import FAMILY, TOLERATED
 from wristctl.commands.recommend.own_rig import drawn_of_facts
+from wristctl.commands.recommend.study_file import homes
 from wristctl.config.families import Family
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.drawn_worlds import asked_of, world_of
+from wristctl.simulation.drawn_worlds import asked_of, believed_world_of
 from wristctl.simulation.planes import Asked, planes_of
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.spatial.held_bends import held_all_around
@@ -30,7 +31,7 @@ def asked_of_rigs(study: Study) -> list[Asked]:
 
 def _family(study: Study, largest_deg: float, planes: int = 1) -> Family:
     """As `RecommendSettings.family`; of a robot of one's own with what is drawn from its facts."""
-    family = study.recommend.family(largest_deg, planes)
+    family = study.recommend.family(largest_deg, planes).model_copy(update={"homed": homes(study)})
     return family if study.recommend.rig is None else drawn_of_facts(study, family)
 
 
@@ -47,7 +48,7 @@ def reach_deg(study: Study) -> float:
     settings, planes = study.recommend, planes_of(study.wrist, asked_of_rigs(study))
     wanted = min(settings.largest_deg, study.wrist.range_deg)
     family, count = _family(study, wanted, planes), min(settings.tests, _RIGS)
-    rigs = [world_of(family, FAMILY, "test", study.seed, number) for number in range(count)]
+    rigs = [believed_world_of(family, FAMILY, "test", study.seed, number, study.wrist) for number in range(count)]
     held = sorted(_held_deg(study.wrist, rig, wanted, planes) for rig in rigs)
     return float(math.floor(held[int(TOLERATED * count)]))
 

@@ -156,7 +156,7 @@ def _scales(study: Study) -> list[float]:
 
 def _weakest(study: Study) -> float:
     """Share of the believed stiffness that springs may have."""
-    drawn = study.recommend.draw.get("plant.stiffness")
+    drawn = study.recommend.drawn.get("plant.stiffness")
     low = None if drawn is None else drawn_value(drawn, 0.0)
     return max(_WEAKEST, float(low[1:])) if isinstance(low, str) and low.startswith("x") else _WEAKEST
 

@@ -29,8 +29,23 @@ def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str,
         "compare": {"loops": {"rig": rig | bends}} | _moves(reach_deg),
     }
     if hw_run_fits(study, study.recommend.loop):
-        sections["hw_run"] = rig | bends | _within(study.hw_run.reference, reach_deg) | _emulated(study, planes)
+        within = _within(study.hw_run.reference, reach_deg)
+        sections["hw_run"] = rig | bends | _homing(study) | within | _emulated(study, planes)
     return sections
+
+
+def homes(study: Study) -> bool:
+    """Whether trials of what is recommended wind by the tendons' stretch that homing measures: those of the board."""
+    if own_rig(study) is not None or trial_of(study) != "hw-run":
+        return False
+    given = "stretch" in study.hw_run.homing.model_fields_set and study.hw_run.homing.stretch == "believed"
+    return not given
+
+
+def _homing(study: Study) -> dict[str, Any]:
+    """Homing as the study states it, and what its trials take up of it."""
+    stated = study.hw_run.homing.model_dump(mode="json", exclude_unset=True)
+    return {"homing": stated | {"stretch": "measured"}} if homes(study) else {}
 
 
 # What of tendons and camera an emulated rig has of its own.
