@@ -105,6 +105,20 @@ def test_motors_that_stand_off_their_targets_by_friction_do_stand() -> None:
     assert not drive.moving
 
 
+def test_a_drive_goes_on_from_where_homing_has_left_its_motors() -> None:
+    guarded = GuardedRig(SlowMotors(age=None), "my_rig.py:RIG")
+    drive = RigDrive(guarded, settings_of(), guarded.connect())
+    drive.jog([100, -40])
+    drive.begin()
+    assert drive.reeled() == pytest.approx([100.0, -40.0]) and not drive.moving and not drive.sent.any()
+    drive.lead(np.array([110.0, -60.0]), np.zeros(2))
+    assert drive.sent == pytest.approx([10.0 / PERIOD, -20.0 / PERIOD]) and drive.moving
+    assert drive.targets == pytest.approx([5.0 + 1.1e5 * STEP, -3.0 - 6e4 * STEP])
+    drive.home()
+    drive.begin()
+    assert drive.reeled() == pytest.approx([0.0, 0.0]) and drive.targets[0] == pytest.approx(5.0 + 1.1e5 * STEP)
+
+
 class Says(SlowMotors):
     """It looks as a test says."""
 
