@@ -225,7 +225,8 @@ def page(table: Table, loads: Loads) -> str:
     columns = list(itertools.product(CURRENTS, TRIED))
     through, left = sum(ended.outcome == "ok" for ended in table.values()), len(CASES) * len(columns) - len(table)
     over_all, stopped = medians(table, "1.0 A")
-    above = max((ended.pull - told(*at, ended.limit) for (_, *at), ended in table.items()), default=0.0)
+    above = max((ended.pull - told(current, motion, ended.limit) for (_, current, motion), ended in table.items()),
+                default=0.0)  # fmt: skip
     more = f"; {left} more trials are to be made" if left else ""
     head = f"""
         {len(table)} trials on the emulated rig, without load cells: in {len(beyond(table))} of them a tendon truly

@@ -202,10 +202,10 @@ _OF_A_RIG: Mapping[str, Mapping[str, str]] = {
     "pull": {"meaning": "largest tension by where the motors are and the estimated bend"},
     "travel": {"meaning": "target furthest from zero", "stops": "a target {value} from zero, beyond {limit}"},
     "jump": {
-        "meaning": "bend against where targets should have it, change within 40 ms or from a look to the next",
+        "meaning": "bend against where targets should have it, change between two looks",
         "causes": "the sensor has slipped; bends dated wrongly",
-        "stops": "the bend jumps by {value} off its targets, beyond {limit}",
-        "notes": "{value} of jump off its targets (limit {limit})",
+        "stops": "the bend jumps by {value} from one look to the next, beyond {limit}",
+        "notes": "{value} of jump between looks (limit {limit})",
     },
     "load": {"causes": _TARGETS},
     "apart": {"meaning": "bend against where targets should have it", "causes": _TARGETS},
