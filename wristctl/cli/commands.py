@@ -195,7 +195,6 @@ COMMANDS = {
         shortcuts=("of", "controller", "gains", "over"),
         examples=(
             "wristctl analyse --controller computed-torque --gains default",
-            "wristctl analyse experiments/hysteresis.yaml",
             "wristctl analyse --of hysteresis --set hysteresis.drive=tensions --set 'hysteresis.sheaths=[0, 1]'",
             "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
             "wristctl analyse --controller smc-tracking --gains hardware --set loop.control_period=5e-3 "

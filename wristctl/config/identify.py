@@ -49,8 +49,7 @@ class IdentifySettings(Section):
     trial: str | None = of_file("trial of a log that is the loop of hysteresis, where it has several")
     model: Literal["arcs", "wrist", "hysteresis"] = choice(
         "arcs",
-        "what logs are of: any robot, as arcs without weight; the study's wrist, in two planes; or a loop of its "
-        "tension and angle there and back, whose friction is found",
+        "what logs are of: any robot, as arcs without weight; the study's wrist, in two planes; or its hysteresis",
     )
     fix: Fixed = Fixed()
     known: KnownBeforehand = KnownBeforehand()

@@ -28,14 +28,10 @@ class SimulateSettings(Section):
 class AnalyseSettings(Section):
     """The loop of the `simulate` section, linearised about where it rests; or the wrist's hysteresis by its section."""
 
-    of: Literal["loop", "hysteresis"] = choice(
-        "loop", "what is analysed: the closed loop of simulate, or the wrist on its tendons without a controller"
-    )
+    of: Literal["loop", "hysteresis"] = choice("loop", "simulate's closed loop, or the wrist without a controller")
     angles_deg: tuple[float, ...] = quantity(
         (), "deg", "resting angles toward the direction; none: straight, half way, and where the reference ends"
     )
-    over: str = choice(
-        "loop", "what the root locus goes over: loop (its gain), or a gain of the controller by its name"
-    )
+    over: str = choice("loop", "of the root locus: loop (its gain), or a gain by its name")
     span: float = quantity(10.0, "", "the root locus goes from 1/span to span times that gain", gt=1, le=1000)
     friction: Literal["slipping", "stuck"] = choice("slipping", "how the friction of elastic tendons is linearised")

@@ -134,7 +134,7 @@ def names_read(command: str, study: Study | None = None) -> set[str]:
 
 
 def _keys(command: str, study: Study | None = None) -> Sequence[str]:
-    unread = () if study is None or command != "analyse" else _UNREAD[study.analyse.of]
+    unread = () if study is None or command != "analyse" else _UNREAD.get(study.analyse.of, ())
     return tuple(name for name in (*_SHARED, command, *_READ.get(command, ())) if name not in unread)
 
 

@@ -92,11 +92,11 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 
 def analyse(session: Session) -> Analysed | Hysteresis:
-    """Linearise one closed loop at rest: gain, phase and delay margins, sensitivity, step, root locus, phase portrait.
+    """Find margins, sensitivity, step, root locus and phase portrait of one closed loop at rest.
 
-    The loop is that of the `simulate` section, in one plane or in two, as `simulate` finds them. Exit code 3 where it
-    is unstable. With `--of hysteresis` it is the wrist on its tendons alone, by the `hysteresis` section: loops of
-    tension and angle at several speeds, ranges and frictions, the dead band, and circles in two planes.
+    The loop is that of the `simulate` section, in one plane or in two, as `simulate` finds them;
+    exit code 3 where it is unstable. With `--of hysteresis` it is the wrist alone, by the section
+    `hysteresis`: loops of tension and angle, the dead band, circles in two planes.
     """
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     chosen, settings, planes = study.simulate, study.analyse, planes_of_simulation(study)

@@ -128,14 +128,13 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 
 def identify(session: Session) -> Identified | AnyTold:
-    """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
+    """Find a real wrist's stiffness, damping, tendons and delay from trials, with 95 % intervals.
 
-    Trials are those of hw-run runs, or of open logs of wrists with two or more tendons in one plane or two. Of logs a
-    parameter has its interval or is not identifiable, and a part that was not fitted decides which of slack, friction
-    and creep they want. Tensions or motors' currents may stand in place of spools. With `--model wrist` logs in two
-    planes are of the study's wrist: springs, their axis, and each tendon's direction and gain. With `--model
-    hysteresis` a log is a loop of its tension and angle there and back: friction of tendons and wrist, stiffness,
-    radius and slack.
+    Trials are those of hw-run runs, or of open logs of wrists with two or more tendons, in one
+    plane or two, with spools, tensions or motors' currents. Of logs a parameter has its interval
+    or is not identifiable, and a part that was not fitted decides which of slack, friction and
+    creep they want. With `--model wrist` logs in two planes are of the study's wrist: its springs'
+    axis, each tendon's place; with `--model hysteresis` a loop tells friction of the tendons.
     """
     if session.study.identify.logs:
         return _OF_LOGS[session.study.identify.model][1](session)
