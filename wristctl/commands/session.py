@@ -110,7 +110,13 @@ class Unattended:
         """Raises UserError."""
         raise UserError(f"nobody is there to agree to this: {action}", fix="use the command line", exit_code=3)
 
-    dare = wait_for = confirm
+    def dare(self, action: str) -> None:
+        """Raises UserError."""
+        self.confirm(action)
+
+    def wait_for(self, action: str) -> None:
+        """Raises UserError."""
+        self.confirm(action)
 
     @contextmanager
     def watch(self, trials: Sequence[Trial], session: Session) -> Iterator[Shown]:
