@@ -46,7 +46,7 @@ def _on_this_system() -> None:
         check()
     except UserError as error:
         sys.stderr.write(f"error: {error}\n")
-        print_error(error.what, error.where, error.fix, error.exit_code)
+        print_error(error)
         raise SystemExit(error.exit_code) from None
 
 

@@ -19,9 +19,11 @@ from wristctl.lanes.compile_time import COMPILE_TIME
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
     screen, events = io.StringIO(), []
     console = Console(file=screen, width=20)
-    with module.progress(
-        console, lambda name, **fields: events.append(fields), "tuning", total, "steps", quiet
-    ) as done:
+
+    def keep(_: str, **fields: Any) -> None:
+        events.append(fields)
+
+    with module.Bar(console, quiet) as bar, bar(keep, "tuning", total, "steps") as done:
         for count in range(1, 1001):
             done(count, best=1.0 / count)
     return screen.getvalue().splitlines(), events
@@ -37,7 +39,7 @@ def test_frequent_calls_give_no_lines_and_few_events() -> None:
 def test_a_step_that_takes_long_has_lines_of_its_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_FIRST_LINE", 0.2)
     screen = io.StringIO()
-    with module.progress(Console(file=screen, width=20), no_event, "tuning", 1000, "steps", False) as done:
+    with module.progress(Console(file=screen, width=20), "tuning", False, 1000, "steps") as done:
         done(100, best=0.5)
         done(500, best=0.002)
         time.sleep(0.3)
@@ -173,7 +175,7 @@ def test_nothing_is_announced_and_quiet_is_quiet(monkeypatch: pytest.MonkeyPatch
     assert _shown(None)[0] == []
     monkeypatch.setattr(module, "_FIRST_LINE", 0.1)
     screen = io.StringIO()
-    with module.progress(Console(file=screen, width=20), no_event, "tuning", None, "", True):
+    with module.progress(Console(file=screen, width=20), "tuning", True):
         time.sleep(0.3)
     assert screen.getvalue() == ""
 
@@ -182,7 +184,7 @@ def test_what_says_nothing_for_long_is_said_to_go_on_off_a_terminal(monkeypatch:
     """A rig that is prepared for a minute, in a pipe."""
     monkeypatch.setattr(module, "_FIRST_LINE", 1.0)
     screen = io.StringIO()
-    with module.progress(Console(file=screen, width=80), no_event, "opening board and camera", None, "", False):
+    with module.progress(Console(file=screen, width=80), "opening board and camera", False):
         time.sleep(1.3)
     (still,) = screen.getvalue().splitlines()
     assert still == "opening board and camera, 1 s so far"

@@ -25,6 +25,7 @@ from wristctl.commands.hw_run.trial_means import completed
 from wristctl.control.table import controller
 from wristctl.errors import UserError
 from wristctl.records import start_run
+from wristctl.simulation.oscillation import LIMIT_CYCLE
 
 SEED = 20261129
 PAGE = Path(__file__).parents[2] / "docs" / "hardware" / "twins.md"
@@ -66,7 +67,7 @@ def ended_on(number: int) -> dict[str, Any]:
     seen, true, simulated = (float(np.degrees(each[0])) for each in swings)
     return drawn | {
         "seen": seen, "true": true, "simulated": simulated,
-        "swings": bool(swings.rig[0]), "twin": bool(swings.simulation[0]),
+        "swings": bool(swings.known[0] > 2.0 * LIMIT_CYCLE), "twin": bool(swings.simulated[0] > 2.0 * LIMIT_CYCLE),
     }  # fmt: skip
 
 

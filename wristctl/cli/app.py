@@ -13,8 +13,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
-from wristctl.cli.commands import COMMANDS, Entry
-from wristctl.cli.json_output import Interrupted, Shown, print_error
+from wristctl.cli.commands import COMMANDS, PAPER, Entry
+from wristctl.cli.json_output import Interrupted, print_error
 from wristctl.cli.matplotlib_defaults import use_defaults
 from wristctl.cli.options import everything
 from wristctl.errors import UserError, error_of_the_system
@@ -72,6 +72,14 @@ wristctl simulate --controller smc --gains exchanged
 wristctl compare pid-ff adrc ct-dob"""
 
 
+def lazy_app(commands: Mapping[str, Entry], help_: str) -> typer.Typer:
+    """A command that holds these ones, each imported when it is called."""
+    holder = typer.Typer(cls=lazy_group(commands), help=help_, no_args_is_help=True, add_completion=False)
+    holder.callback()(lambda: None)
+    return holder
+
+
+paper = lazy_app(PAPER, "Check the paper's claims one by one.")
 app = typer.Typer(cls=lazy_group(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
 
 
@@ -104,13 +112,13 @@ def main() -> NoReturn:
         except BrokenPipeError:
             code = _unread()
         except Interrupted as error:
-            code = _interrupted(error.where, error.fix)
+            code = _interrupted(error)
         except UserError as error:
-            code = _failed(error, str(error), error.what, error.where, error.fix, error.exit_code)
+            code = _failed(error, error)
         except typer.TyperException as error:
             command = getattr(getattr(error, "ctx", None), "command_path", "wristctl")
-            what, fix = error.format_message(), f"{command} --help"
-            code = _failed(error, f"{what} - fix: {fix}", what, command, fix, error.exit_code)
+            told = UserError(error.format_message(), command, f"{command} --help", error.exit_code)
+            code = _failed(error, told, f"{told.what} - fix: {told.fix}")
         except (KeyboardInterrupt, typer.Abort):
             code = _interrupted()
         except SystemExit as ended:  # completion ends so, and typer where it meets a closed pipe
@@ -122,10 +130,12 @@ def main() -> NoReturn:
             if interrupt.asked:
                 code = _interrupted()
             elif refused := error_of_the_system(error):
-                code = _failed(error, str(refused), refused.what, refused.where, refused.fix, refused.exit_code)
+                code = _failed(error, refused)
             else:
-                what = f"bug in wristctl: {type(error).__name__}: {error}"
-                code = _failed(error, f"{what} - {notes[-1]}", what, _raised_at(error), notes[-1], 1)
+                frames = traceback.extract_tb(error.__traceback__)[-1:]
+                where = "".join(f"{frame.filename}:{frame.lineno}" for frame in frames)
+                bug = UserError(f"bug in wristctl: {type(error).__name__}: {error}", where, notes[-1], 1)
+                code = _failed(error, bug, f"{bug.what} - {bug.fix}")
         signal.setitimer(signal.ITIMER_REAL, 0.0)  # what has ended need not be interrupted again
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
@@ -137,21 +147,15 @@ def _unread() -> int:
     return 128 + signal.SIGPIPE
 
 
-def _failed(error: BaseException, line: str, what: str, where: str, fix: str, code: int) -> int:
+def _failed(error: BaseException, told: UserError, line: str = "") -> int:
+    """Print what a person, or with --json a program, is told of an error; the exit code."""
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    print(f"error: {printable(' '.join(line.split()))}", file=sys.stderr)
-    if not isinstance(error, Shown):
-        print_error(what, where, fix, code)
-    return code
+    print(f"error: {printable(' '.join((line or str(told)).split()))}", file=sys.stderr)
+    print_error(told)
+    return told.exit_code
 
 
-def _interrupted(where: str = "", fix: str = "") -> int:
-    print_error("interrupted", where, fix, 130)
+def _interrupted(error: Interrupted | None = None) -> int:
+    print_error(error or Interrupted())
     return 130
-
-
-def _raised_at(error: BaseException) -> str:
-    """FILE:LINE of the code that raised."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""

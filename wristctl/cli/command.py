@@ -6,7 +6,7 @@ import re
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
+from contextlib import AbstractContextManager
 from importlib import import_module
 from typing import Any, get_origin
 
@@ -24,15 +24,22 @@ from wristctl.study_files.keys import field_at, section_keys, unit_of, whole_key
 from wristctl.study_files.typed_controllers import TAKE_CONTROLLERS, parted
 
 
-def asked_to_trust(trust: bool, shown: str) -> bool:
-    """Shows what would run; yes where --trust-code was `given`, or where it is typed at a terminal, and never else."""
-    from wristctl.cli.operator import idle, typed_line
+def trusting(trust: bool) -> AbstractContextManager[None]:
+    """Within the block code of a run may be loaded where --trust-code was given, or where yes is typed at a terminal.
 
-    typer.echo(shown, err=True)
-    if trust or not sys.stdin.isatty():
-        return trust
-    typer.echo("Read it. Type yes to let it run: ", nl=False, err=True)
-    return typed_line(idle) == "yes"
+    What would run is shown before.
+    """
+
+    def ask(shown: str) -> bool:
+        from wristctl.cli.operator import idle, typed_line
+
+        typer.echo(shown, err=True)
+        if trust or not sys.stdin.isatty():
+            return trust
+        typer.echo("Read it. Type yes to let it run: ", nl=False, err=True)
+        return typed_line(idle) == "yes"
+
+    return asking(ask)
 
 
 _SWEEP = "One setting at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
@@ -52,7 +59,10 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
 
     def call(**arguments: Any) -> None:
         if entry.listing is not None and arguments.pop("list"):
-            return _list(entry.listing[0], arguments["as_json"])
+            from wristctl.cli.output import print_table
+
+            module, _, name = entry.listing[0].partition(":")
+            return print_table(getattr(import_module(module), name)(), arguments["as_json"])
         leaves = {leaf: arguments.pop(_option_of(leaf)) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
@@ -61,7 +71,8 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
         set_ = [f"{leaf}={typed[leaf]}" for leaf in leaves if leaves[leaf] is not None]
         set_ += [f"sweep={json.dumps(sweeps)}"] if sweeps else []
         options = Options(**arguments)
-        _execute(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
+        with trusting(options.trust_code):
+            _perform(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
 
     keys = section_keys(procedure.kind)
     for leaf in shortcuts:
@@ -76,13 +87,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     completed: dict[str, Callable[..., list[str]]] = {"controller": controllers, "reference.kind": references}
     completed |= {need.leaf: run_ids for need in procedure.needs}
     parameters = [
-        Own(
-            _option_of(leaf),
-            _help_of(keys[leaf]),
-            kinds.get(leaf, str),
-            completed.get(leaf),
-            leaf in entry.advanced,
-        )
+        Own(_option_of(leaf), _help_of(keys[leaf]), kinds.get(leaf, str), completed.get(leaf), leaf in entry.advanced)
         for leaf in (*first, *shortcuts, *named)
     ]
     parameters += [Own(name, text, bool) for name, text in flags.items()]
@@ -107,23 +112,9 @@ def _help_of(field: FieldInfo) -> str:
     return _shown(f"{field.description or ''}{f' [{unit}]' * bool(unit)}")
 
 
-def _list(place: str, as_json: bool) -> None:
-    from wristctl.cli.output import print_table
-
-    module, _, name = place.partition(":")
-    print_table(getattr(import_module(module), name)(), as_json)
-
-
 def _option_of(leaf: str) -> str:
     """Name of the option for a leaf: `reference` for `reference.kind`."""
     return leaf.partition(".")[0]
-
-
-def _execute(
-    procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
-) -> None:
-    with asking(partial(asked_to_trust, options.trust_code)):
-        _perform(procedure, options, shortcuts, flags, executor)
 
 
 def _perform(

@@ -216,14 +216,14 @@ COMMANDS = {
     "list": Entry(
         "wristctl.cli.list_choices:app", _MORE, "List controllers, presets, references, conditions or metrics."
     ),
-    "schema": Entry("wristctl.cli.schema:app", _MORE, "Print the JSON schema of study files, for editors."),
+    "schema": Entry("wristctl.cli.your_own:schema_app", _MORE, "Print the JSON schema of study files, for editors."),
     "export-model": Entry(
-        "wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo, MATLAB or as URDF."
+        "wristctl.cli.exports:model_app", _MORE, "Write the wrist of a run for MuJoCo, MATLAB or as URDF."
     ),
     "export-law": Entry(
-        "wristctl.cli.export_law:app", _MORE, "Write a tuned controller in C and NumPy for your own firmware."
+        "wristctl.cli.exports:law_app", _MORE, "Write a tuned controller in C and NumPy for your own firmware."
     ),
-    "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
+    "paper": Entry("wristctl.cli.app:paper", _MORE, "Check the paper's claims one by one."),
 }
 
 # Commands of `wristctl paper`.
@@ -252,7 +252,7 @@ COMMANDS |= {
 # Commands of `wristctl hw calibrate`.
 CALIBRATIONS = {
     "board-pdf": Entry(
-        "wristctl.cli.hw_calibrate:board_pdf_app",
+        "wristctl.cli.hw_sheets:board_pdf_app",
         None,
         "Write the board and the markers as a PDF, to print at true scale.",
     ),

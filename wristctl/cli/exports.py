@@ -1,25 +1,24 @@
-"""`wristctl export-model`: the wrist of a run for another program."""
+"""`wristctl export-model` and `export-law`: the wrist of a run, and a tuned controller, for other programs."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from wristctl.cli.command import asked_to_trust
-from wristctl.cli.options import RESULTS, Debug, Out, Ref, TrustCode
+from wristctl.cli.command import trusting
+from wristctl.cli.options import RESULTS, Out, Ref, TrustCode, controllers_and_studies, set_option, with_debug
 from wristctl.cli.output import say
-from wristctl.plugins.trust import asking
 
-app = typer.Typer(add_completion=False)
+model_app, law_app = typer.Typer(add_completion=False), typer.Typer(add_completion=False)
 
-_EPILOG = (
+_OF_MODEL = (
     "Examples:\n\nwristctl export-model latest:identify --to matlab\n\n"
     "wristctl export-model RUN --to mujoco --planes 2 --motors spools"
 )
 
 
-@app.command("export-model", epilog=_EPILOG)
+@model_app.command("export-model", epilog=_OF_MODEL)
+@with_debug
 def export_model(
     ref: Ref,
     to: Annotated[Literal["mujoco", "matlab", "urdf"], typer.Option("--to", help="The program that is to read it.")],
@@ -41,7 +40,6 @@ def export_model(
     ] = None,
     trust_code: TrustCode = False,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Write the wrist of a run, identified or as its controller knew it, as a chain of rigid links.
 
@@ -52,5 +50,42 @@ def export_model(
     from wristctl.commands.export.model import Exported, export_wrist
     from wristctl.records import require
 
-    with asking(partial(asked_to_trust, trust_code)):
+    with trusting(trust_code):
         say(export_wrist(require(ref, None, out), to, file, Exported(segments, planes, direction, motors)))
+
+
+_OF_LAW = (
+    "Examples:\n\nwristctl export-law pid-ff mywrist.yaml\n\n"
+    "wristctl export-law ct-dob/hardware mywrist.yaml --set loop.actuator.level=tendon --set loop.sensor.level=camera "
+    "--set loop.control_period=0.01\n\n"
+    "wristctl export-law latest:recommend\n\nwristctl export-law latest:tune pid-ff --folder firmware/law"
+)
+
+
+@law_app.command("export-law", epilog=_OF_LAW)
+@with_debug
+def export_law(
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="CONTROLLER|FILE|RUN...",
+            help="NAME, NAME/PRESET or file.py:NAME with study files; or a run, and a controller of it.",
+            autocompletion=controllers_and_studies,
+        ),
+    ],
+    override: Annotated[list[str] | None, set_option("Override one setting of `simulate`.")] = None,
+    folder: Annotated[Path | None, typer.Option("--folder", help="Where to write; by default NAME_law.")] = None,
+    trust_code: TrustCode = False,
+    out: Out = RESULTS,
+) -> None:
+    """Write a tuned controller in C99 and NumPy, for a firmware of your own.
+
+    The law, the allocation of its torque to tendons within their limits, what the motors are sent, and behind a camera
+    the observer, with the gains and the wrist as constants, test vectors of a simulated loop, a test that compares
+    them, and a README with the order of calls and the units. The loop is that of `simulate` in the study, or the run's.
+    """
+    from wristctl.commands.export.law import export_law as write
+
+    with trusting(trust_code):
+        for path in write(words, override or (), folder, out):
+            say(path)

@@ -7,15 +7,14 @@ import typer
 
 from wristctl.cli.hw_bench import emulate, watch
 from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken, tension
-from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
-from wristctl.cli.hw_drawings import drawings
+from wristctl.cli.hw_sheets import app as calibrations
+from wristctl.cli.hw_sheets import drawings
 from wristctl.cli.hw_weigh import weigh
 from wristctl.cli.json_output import print_json
-from wristctl.cli.options import BAUD, Baud, Debug, Image, Json, Port, Quiet, facts_of
+from wristctl.cli.options import BAUD, Baud, Image, Json, Port, Quiet, facts_of, with_debug
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
-from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -24,7 +23,6 @@ log = logging.getLogger(__name__)
 def ports(
     find: Annotated[bool, typer.Option("--find", help="Find the board's port by unplugging it.")] = False,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """List the serial ports of this computer, those that may be a board first."""
     from wristctl.board.transport import ports as serial_ports
@@ -48,9 +46,7 @@ def ports(
         print("no serial ports; wristctl hw emulate serves a board without hardware")
 
 
-def flash(
-    port: Port = None, image: Image = None, as_json: Json = False, quiet: Quiet = False, debug: Debug = False
-) -> None:
+def flash(port: Port = None, image: Image = None, as_json: Json = False, quiet: Quiet = False) -> None:
     """Write the firmware into the board, read it back, and see that it answers."""
     from wristctl.board.driver import Board
     from wristctl.board.flashing import IMAGE
@@ -59,7 +55,7 @@ def flash(
 
     with listening(quiet, False) as console:
         place = port or only_board()
-        with progress(console, no_event, f"flashing the board at {place}", None, "", quiet):
+        with progress(console, f"flashing the board at {place}", quiet):
             write(place, image or IMAGE, log.info)
         facts: dict[str, Any] = {}
         if image is None:
@@ -74,7 +70,7 @@ def flash(
         print(f"firmware {facts['firmware']} written, verified and answering at {place}")
 
 
-def stop(port: Port = None, baud: Baud = BAUD, debug: Debug = False) -> None:
+def stop(port: Port = None, baud: Baud = BAUD) -> None:
     """Emergency stop: no further step, drives released. Works beside a running program."""
     from wristctl.board.board_errors import PortUnusable
     from wristctl.board.driver import Board
@@ -100,4 +96,4 @@ app = typer.Typer(
 
 app.add_typer(calibrations, name="calibrate")
 for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, tension, clear, weigh, drawings):
-    app.command(command.__name__)(command)
+    app.command(command.__name__)(with_debug(command))

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from wristctl.cli.options import RESULTS, Debug, Image, Out, Quiet
+from wristctl.cli.options import RESULTS, Image, Out, Quiet, set_option
 from wristctl.cli.progress import listening, progress
-from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
 from wristctl.records import Run, open_run
 
@@ -29,11 +28,9 @@ def emulate(
         bool, typer.Option("--wrist", help="Hang a simulated wrist on it, before a rendered camera.")
     ] = False,
     override: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="With --wrist: override a setting of hw-run, bench.KEY=VALUE."),
+        list[str] | None, set_option("With --wrist: override a setting of hw-run, bench.KEY=VALUE.")
     ] = None,
     quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Serve the emulated board for any serial client, in real time; its port is the only line on stdout.
 
@@ -41,7 +38,7 @@ def emulate(
     the second's are; press, release (the emergency stop) and directions that the wrist is turned to can be typed.
     """
     with listening(quiet, False) as console:
-        with progress(console, no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
+        with progress(console, "preparing the emulated board (compiled once per version)", quiet):
             from wristctl.board.emulator.atmega2560 import FIRMWARE, Atmega2560
             from wristctl.board.emulator.serve import PtyLine, TcpLine, serve
 
@@ -73,7 +70,7 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
         if allowed:
             log.info(allowed)
-        with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+        with progress(console, "preparing the wrist (compiled once per version)", quiet):
             from wristctl.bench.emulated_rig import Bystander, EmulatedRig
             from wristctl.bench.real_time_bench import films_of
             from wristctl.bench.server import BenchServer
@@ -106,7 +103,6 @@ def watch(
     last: Seconds = 10.0,
     every: Every = 0.5,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Draw angle, reference and tensions of the trials that go on, until their run ends."""
     from wristctl.commands.hw_run.live_figure import newest_rows, recent

@@ -15,7 +15,7 @@ import typer
 
 from wristctl.cli.hw_limits import tell_limits
 from wristctl.cli.operator import idle, typed_line
-from wristctl.cli.options import BAUD, RESULTS, Baud, Debug, Json, Out, Port
+from wristctl.cli.options import BAUD, RESULTS, Baud, Json, Out, Port, set_option
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
 
@@ -24,10 +24,7 @@ if TYPE_CHECKING:
     from wristctl.config.study import Study
     from wristctl.trial.by_hand import ByHand
 
-Override = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override a setting of calibrate-wrist: safety.travel=0.01"),
-]
+Override = Annotated[list[str] | None, set_option("Override a setting of calibrate-wrist: safety.travel=0.01")]
 Calibration = Annotated[
     str | None, typer.Option("--calibration", help="calibrate-wrist run that knows the senses; without one + reels in.")
 ]
@@ -40,7 +37,7 @@ _TENDONS = "Emergency stop within reach, nobody's hands in the tendons?"
 def jog(
     axis: Axis, mm: Annotated[float, typer.Option("--mm", help="Tendon to reel in; negative: to pay out.")],
     port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
-    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False,
 ) -> None:  # fmt: skip
     """Reel a tendon in, or pay it out, slowly and by little; then by as much more as is typed."""
     plan = f"axis {axis} {_reels(mm)}, at 400 steps/s; then the drives hold"
@@ -59,7 +56,7 @@ def jog(
 
 def home(
     port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
-    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False,
 ) -> None:  # fmt: skip
     """Call the place where the motors stand zero, and go from there within soft limits as is typed."""
     plan = "the drives are switched on where they stand, and that is zero; nothing moves until you say so"
@@ -86,7 +83,7 @@ def limits(
     ] = None,
     figure: Annotated[Path | None, typer.Option("--figure", help="With --from: the picture to write.")] = None,
     out: Out = RESULTS, as_json: Json = False,
-    dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+    dry_run: Dry = False, yes: Yes = False,
 ) -> None:  # fmt: skip
     """Set the soft limits of safety.travel, and see that the board keeps them; nothing moves.
 
@@ -105,7 +102,7 @@ def limits(
 def slacken(
     mm: Annotated[float, typer.Option("--mm", min=0.0, help="Tendon to pay out.")] = 0.6,
     port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
-    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False,
 ) -> None:  # fmt: skip
     """Pay out all four tendons together, then release the drives: unloads a wrist that has been stopped."""
     plan = f"each of the four axes {_reels(-mm)}, all together; then the drives are released"
@@ -124,7 +121,7 @@ def tension(
         str | None, typer.Option("--camera", help="Camera that sees a tendon bend the wrist; without it you say so.")
     ] = None,
     port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
-    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False,
 ) -> None:  # fmt: skip
     """Take up each tendon's slack: reel it in until it is taut, by your word or the camera's, then pay out a little.
 
@@ -176,7 +173,7 @@ def _says_taut(board: Board, axis: int, reeled: float) -> bool:
             return not typed
 
 
-def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False, debug: Debug = False) -> None:
+def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False) -> None:
     """Clear a latched fault once its cause is mended; drives that hold let go."""
     from wristctl.board.driver import Board
     from wristctl.board.layout import FAULT_MEANING

@@ -10,11 +10,10 @@ import typer
 
 from wristctl.cli.json_output import print_json
 from wristctl.cli.operator import typed_line
-from wristctl.cli.options import BAUD, Baud, Debug, Json, Port, Quiet, facts_of
+from wristctl.cli.options import BAUD, Baud, Json, Port, Quiet, facts_of, set_option
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.inputs import check_wound
 from wristctl.commands.printed_table import Table
-from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
 
@@ -41,13 +40,10 @@ def check(
         str | None, typer.Option("--optics-2", metavar="RUN", help="With --rig: that of the second camera.")
     ] = None,
     axis: Annotated[int, typer.Option("--axis", min=0, max=3, help="With --rig: axis that is to be moved.")] = 2,
-    override: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="With --rig: a setting of hw-run.")
-    ] = None,
+    override: Annotated[list[str] | None, set_option("With --rig: a setting of hw-run.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nobody before a motor moves.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
     if rig:
@@ -61,7 +57,7 @@ def check(
 
     with listening(quiet, False) as console:
         if port == EMULATED:
-            with progress(console, no_event, "preparing the emulated board", None, "", quiet):
+            with progress(console, "preparing the emulated board", quiet):
                 transport = open_transport(port, baud)
         else:
             transport = open_transport(port, baud)
@@ -136,12 +132,12 @@ def check_rig(
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
         if priority:
             typer.echo(priority, err=True)
-        with progress(console, no_event, f"opening board and camera{'s' * (settings.planes == 2)}", None, "", quiet):
+        with progress(console, f"opening board and camera{'s' * (settings.planes == 2)}", quiet):
             testbed = open_testbed(settings, study.wrist, study.seed, view, lambda *_: None, pictures, view_2)
         try:
             with Board(testbed.transport) as board:
                 moved = yes or _agreed(axis, Patience(board).pulse)
-                with progress(console, no_event, "measuring", None, "strokes", quiet) as advance:
+                with progress(console, "measuring", quiet, None, "strokes") as advance:
                     facts = measure(testbed, board, pictures, settings, study.wrist, axis if moved else None, advance)
         finally:
             testbed.close()

@@ -10,7 +10,7 @@ import typer
 
 from wristctl.cli.hw_by_hand import Dry
 from wristctl.cli.operator import idle, typed_line
-from wristctl.cli.options import BAUD, Baud, Debug, Port, study_files
+from wristctl.cli.options import BAUD, Baud, Port, study_files
 from wristctl.commands.printed_table import Table
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
@@ -29,7 +29,7 @@ def weigh(
         float | None, typer.Option("--kg", min=0.1, help="Weight that is hung on one tendon's cell after the other.")
     ] = None,
     axis: Annotated[int | None, typer.Option("--axis", min=0, max=3, help="Weigh with this axis's cell alone.")] = None,
-    port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, debug: Debug = False,
+    port: Port = None, baud: Baud = BAUD, dry_run: Dry = False,
 ) -> None:  # fmt: skip
     """Read the tendons' load cells, take what they show as no pull, and with --kg find their scale; nothing moves.
 

@@ -21,7 +21,7 @@ class Shown(UserError):
 class Interrupted(UserError):
     """Ctrl-C in a command that has told where what was found is, and how to go on."""
 
-    def __init__(self, where: str, fix: str) -> None:
+    def __init__(self, where: str = "", fix: str = "") -> None:
         super().__init__("interrupted", where, fix, 130)
 
 
@@ -29,23 +29,22 @@ def print_json(shown: Mapping[str, Any], error: UserError | None = None) -> None
     """Print a result as one object. Where the command fails all the same, the error is in it, and raised."""
     from wristctl.records.journal import jsonable
 
-    facts = {"error": _facts(error.what, error.where, error.fix, error.exit_code)} if error else {}
+    facts = {"error": _facts(error)} if error else {}
     print(json.dumps(jsonable({**shown, **facts}), indent=2, allow_nan=False))
     if error:
         raise Shown(error.what, error.where, error.fix, error.exit_code) from error
 
 
-def print_error(what: str, where: str, fix: str, exit_code: int) -> None:
+def print_error(error: UserError) -> None:
     """Where `--json` was typed, print an error as one object. A reader that has left, or a full disk, is no other."""
-    if "--json" not in sys.argv:
+    if "--json" not in sys.argv or isinstance(error, Shown):
         return
-    facts = _facts(what, where, fix, exit_code)
     try:
-        print(json.dumps({"schema": "wristctl.error/1", **facts}, indent=2), flush=True)
+        print(json.dumps({"schema": "wristctl.error/1", **_facts(error)}, indent=2), flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
-def _facts(what: str, where: str, fix: str, exit_code: int) -> dict[str, Any]:
-    kind = _KINDS.get(exit_code, "check")
-    return {"kind": kind, "exit_code": exit_code, "what": what, "where": where, "fix": fix}
+def _facts(error: UserError) -> dict[str, Any]:
+    kind = _KINDS.get(error.exit_code, "check")
+    return {"kind": kind, "exit_code": error.exit_code, "what": error.what, "where": error.where, "fix": error.fix}

@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import wraps
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -99,6 +100,29 @@ TrustCode = Annotated[
 Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.", rich_help_panel=ADVANCED)]
 
 
+def with_debug(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The command with the option --debug, for which the end of the program looks by itself."""
+
+    @wraps(command)
+    def call(*arguments: Any, debug: bool = False, **options: Any) -> Any:
+        return command(*arguments, **options)
+
+    own = inspect.signature(command, eval_str=True)
+    debug = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
+    call.__signature__ = own.replace(parameters=[*own.parameters.values(), debug])  # type: ignore[attr-defined]
+    return call
+
+
+def set_option(help_: str) -> Any:
+    """The option --set with this help."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=help_)
+
+
+def config_option(help_: str) -> Any:
+    """The option --config of a command that makes no run, with this help."""
+    return typer.Option("--config", "-c", metavar="FILE", help=help_)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """The shared options; each field's annotation is the option as typed."""
@@ -120,10 +144,7 @@ class Options:
             rich_help_panel=ADVANCED,
         ),
     ] = None
-    override: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override one setting: a.b=value."),
-    ] = None
+    override: Annotated[list[str] | None, set_option("Override one setting: a.b=value.")] = None
     seed: Annotated[
         int | None, typer.Option("--seed", help="Root of every random stream.", rich_help_panel=ADVANCED)
     ] = None

@@ -14,7 +14,7 @@ from rich.live import Live
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from wristctl.commands.progress import Ahead, Count, counting, duration, left_words
+from wristctl.commands.progress import Ahead, Count, counting, duration, left_words, no_event
 from wristctl.commands.session import Done, Event
 from wristctl.escape import printable_lines
 from wristctl.lanes.compile_time import COMPILE_TIME
@@ -164,11 +164,9 @@ class _Left(ProgressColumn):
 
 
 @contextmanager
-def progress(
-    console: Console, event: Event, activity: str, total: int | None, unit: str, quiet: bool
-) -> Iterator[Done]:
-    """Show the progress of a command that has one task."""
-    with Bar(console, quiet) as bar, bar(event, activity, total, unit) as advance:
+def progress(console: Console, activity: str, quiet: bool, total: int | None = None, unit: str = "") -> Iterator[Done]:
+    """Show the progress of a command that has one task and makes no run."""
+    with Bar(console, quiet) as bar, bar(no_event, activity, total, unit) as advance:
         yield advance
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside
 from wristctl.plain_files import read_plain
-from wristctl.plugins.trust import run_around, trusted
+from wristctl.plugins.trust import digest_now, run_around, trusted
 
 _PREFIX = "wristctl_foreign_"
 
@@ -51,9 +51,8 @@ def data_file(source: str, name: str) -> Path:
     """
     file = Path(os.path.abspath(Path(source).parent / name))
     if not file.is_file():
-        raise UserError(
-            f"no file {name} beside {Path(source).name}", str(file), "paths count from the controller's file"
-        )
+        problem = f"no file {name} beside {Path(source).name}"
+        raise UserError(problem, str(file), "paths count from the controller's file")
     if _under_way:
         root = _under_way[-1].root
         if not file.resolve().is_relative_to(root.resolve()):
@@ -63,14 +62,6 @@ def data_file(source: str, name: str) -> Path:
         problem = f"{name} is asked for when {Path(source).name} has been imported, and would not be kept with it"
         raise UserError(problem, source, "call data_file at the top of the file")
     return file
-
-
-def digest_now(file: Path) -> str:
-    """SHA-256 of a file as it is; empty where it cannot be read."""
-    try:
-        return hashlib.sha256(read_plain(file)).hexdigest()
-    except OSError:
-        return ""
 
 
 class _Source(SourceFileLoader):

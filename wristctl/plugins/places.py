@@ -17,8 +17,8 @@ from wristctl.config.former_names import file_today
 from wristctl.config.leaves import renamed_in_sweep, swept_controllers
 from wristctl.errors import UserError, meant
 from wristctl.interrupt import from_outside
-from wristctl.plugins.import_hook import digest_now, imported, root_of
-from wristctl.plugins.trust import run_around, trusted
+from wristctl.plugins.import_hook import imported, root_of
+from wristctl.plugins.trust import digest_now, run_around, trusted
 
 log = logging.getLogger(__name__)
 
@@ -31,10 +31,10 @@ def placed(value: Any, document: Path | None) -> Any:
     Raises UserError where the document is part of a run and names code that is not.
     """
     if isinstance(value, dict):
-        return {
-            key: _placed_sweep(entry, document) if key == "sweep" else placed(entry, document)
-            for key, entry in value.items()
-        }
+        data = {key: entry if key == "sweep" else placed(entry, document) for key, entry in value.items()}
+        if _are_axes(value.get("sweep")):
+            data["sweep"] = renamed_in_sweep(value["sweep"], lambda _, name: str(placed(name, document)))
+        return data
     if isinstance(value, tuple):
         return tuple(placed(entry, document) for entry in value)
     if not isinstance(value, str) or not is_reference(value):
@@ -46,10 +46,6 @@ def placed(value: Any, document: Path | None) -> Any:
     if document:
         check_within(moved, document)
     return f"{moved}:{attribute}"
-
-
-def _placed_sweep(axes: Any, document: Path | None) -> Any:
-    return renamed_in_sweep(axes, lambda _, name: str(placed(name, document))) if _are_axes(axes) else axes
 
 
 def _are_axes(entry: Any) -> bool:
@@ -103,12 +99,8 @@ def load(reference: str) -> tuple[Any, Foreign]:
     module, files = cached
     if not hasattr(module, attribute):
         members = {name: member for name, member in vars(module).items() if not name.startswith("_")}
-        names = [
-            name
-            for name, member in members.items()
-            if not isinstance(member, ModuleType)
-            and (not callable(member) or getattr(member, "__module__", "") == module.__name__)
-        ]
+        own = {n: m for n, m in members.items() if not callable(m) or getattr(m, "__module__", "") == module.__name__}
+        names = [name for name, member in own.items() if not isinstance(member, ModuleType)]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
 
@@ -171,12 +163,9 @@ def entry_point(group: str, name: str) -> tuple[Any, Foreign]:
     """
     candidates = _of(group)[name]
     if len(candidates) > 1:
-        where = ", ".join(
-            f"{candidate.dist.name if candidate.dist else '?'} ({candidate.value})" for candidate in candidates
-        )
-        raise UserError(
-            f"{len(candidates)} installed packages have a '{name}' in {group}", where, "uninstall all but one"
-        )
+        where = ", ".join(f"{one.dist.name if one.dist else '?'} ({one.value})" for one in candidates)
+        problem = f"{len(candidates)} installed packages have a '{name}' in {group}"
+        raise UserError(problem, where, "uninstall all but one")
     (only,) = candidates
     with contained(f"loading the entry point '{name}'", f"{group}: {only.value}"):
         target = only.load()

@@ -101,6 +101,14 @@ def _content(source: Path) -> bytes:
         raise unreadable(error, source) from error
 
 
+def digest_now(file: Path) -> str:
+    """SHA-256 of a file as it is; empty where it cannot be read."""
+    try:
+        return hashlib.sha256(read_plain(file)).hexdigest()
+    except OSError:
+        return ""
+
+
 def _listing(root: Path, files: Mapping[Path, str]) -> list[str]:
     return [f"{digest}  {source.relative_to(root).as_posix()}" for source, digest in sorted(files.items())]
 
@@ -110,12 +118,8 @@ def _sealed_here(home: Path, sealed: Mapping[str, str] | None, root: Path) -> bo
 
     The code itself is as it was sealed, or it is refused before.
     """
-    if not sealed or not root.is_relative_to(home / _CODE) or not is_noted(sealed):
-        return False
-    try:
-        return hashlib.sha256(read_plain(home / _CONFIG)).hexdigest() == sealed.get(_CONFIG)
-    except OSError:
-        return False
+    noted = sealed and root.is_relative_to(home / _CODE) and is_noted(sealed)
+    return bool(noted and sealed and digest_now(home / _CONFIG) == sealed.get(_CONFIG))
 
 
 def _check_seal(home: Path, sealed: Mapping[str, str] | None, files: Mapping[Path, str]) -> None:

@@ -2,6 +2,7 @@
 
 import typer
 
+from wristctl.cli.options import with_debug
 from wristctl.cli.runs.drawing import cite, export, figures, table
 from wristctl.cli.runs.housekeeping import gc, pack, rm, unpack
 from wristctl.cli.runs.listing import diff, lineage, ls, show, tag
@@ -15,4 +16,4 @@ for verb in (
     ls, show, lineage, diff, trend, verify, sign, replay, report, serve, figures, table, cite, export, pack,
     unpack, tag, rm, gc,
 ):  # fmt: skip
-    app.command(verb.__name__)(verb)
+    app.command(verb.__name__)(with_debug(verb))

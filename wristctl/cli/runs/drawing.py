@@ -4,20 +4,17 @@ import logging
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import StrEnum
-from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from wristctl.cli.command import asked_to_trust
-from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, TrustCode
+from wristctl.cli.command import trusting
+from wristctl.cli.options import RESULTS, Out, Quiet, Ref, TrustCode
 from wristctl.cli.output import say
 from wristctl.cli.progress import Bar, Terminal, listening, progress
-from wristctl.commands.progress import no_event
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
-from wristctl.plugins.trust import asking
 from wristctl.records import Run, open_run
 from wristctl.records.index import DRAWN
 from wristctl.records.manifest import read_overview
@@ -43,7 +40,7 @@ def draw_later(run: Run, quiet: bool) -> Path:
 def _draw(names: Sequence[str], write: Callable[[str], None], console: Terminal, quiet: bool) -> list[str]:
     """Draw figures one after another; those that cannot be drawn, of which each has a warning."""
     failed = []
-    with progress(console, no_event, "drawing", len(names), "figures", quiet) as advance:
+    with progress(console, "drawing", quiet, len(names), "figures") as advance:
         for count, name in enumerate(names, start=1):
             try:
                 write(name)
@@ -73,7 +70,6 @@ def figures(
     trust_code: TrustCode = False,
     out: Out = RESULTS,
     quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Draw figures of a run anew, also those that it left for later, as wide as a column.
 
@@ -86,8 +82,7 @@ def figures(
     run, inches = open_run(ref, out), _inches(width) if width else None
     folder = to or run.path.parent / f"{DRAWN}{run.id}"
     _check_names(names or (), read_overview(run.path).captions, run)
-    trust = asking(partial(asked_to_trust, trust_code))
-    with listening(quiet, False) as console, for_paper(inches), trust:
+    with listening(quiet, False) as console, for_paper(inches), trusting(trust_code):
         with Bar(console, quiet) as bar:
             drawn = redrawn(run, bar).figures
         _check_names(names or (), drawn, run)
@@ -130,7 +125,6 @@ def table(
         bool, typer.Option("--latex", help="As LaTeX, a column wide: booktabs, siunitx, array, graphicx.")
     ] = False,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
     from wristctl.cli.runs.latex import latex_table
@@ -147,15 +141,12 @@ def table(
     positions = number or range(1, len(run_tables) + 1)
     sentence = " ".join(takewhile(bool, read_overview(run.path).answer))  # the answer's own table has no title
     caption = f"{capital(sentence)} Run {run.id}." if sentence else f"{run.kind}: run {run.id}"
-    texts = [
-        latex_table(chosen, f"{run.kind}-{position}", caption) if latex else chosen.text()
-        for position in positions
-        for chosen in [run_tables[position - 1]]
-    ]
+    chosen = {f"{run.kind}-{position}": run_tables[position - 1] for position in positions}
+    texts = [latex_table(one, label, caption) if latex else one.text() for label, one in chosen.items()]
     print("\n\n".join(texts))
 
 
-def cite(ref: Ref, out: Out = RESULTS, debug: Debug = False) -> None:
+def cite(ref: Ref, out: Out = RESULTS) -> None:
     """Print BibTeX of a run, by its id and the hash of its result, and of wristctl."""
     from wristctl.cli.runs.latex import bibtex
 
@@ -169,7 +160,6 @@ def export(
         Path | None, typer.Option("--file", help="File or folder to write; by default the run's id, in this folder.")
     ] = None,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Write a run's motions, tables, arrays and videos for other programs, with their units.
 

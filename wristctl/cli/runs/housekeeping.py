@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.options import RESULTS, Debug, Out, Ref, Refs
+from wristctl.cli.options import RESULTS, Out, Ref, Refs
 from wristctl.cli.output import say
 from wristctl.errors import UserError
 from wristctl.records import open_run
@@ -26,7 +26,6 @@ def rm(
     out: Out = RESULTS,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Even where other runs were made from it.")] = False,
-    debug: Debug = False,
 ) -> None:
     """Delete runs, after asking. Refuses to delete one that others were made from, unless --force."""
     runs = removable([open_run(ref, out) for ref in refs], force)
@@ -44,7 +43,6 @@ def rm(
 def gc(
     out: Out = RESULTS,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
-    debug: Debug = False,
 ) -> None:
     """Clear away what killed processes have left, after asking: no run that began is touched."""
     leftover_files, tags = [*leftovers(out), *lost_repetitions()], lost_tags(out)
@@ -77,7 +75,6 @@ def pack(
         Path | None, typer.Option("--file", help="Where to write it; by default the run's id, in this folder.")
     ] = None,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Put a run, and all that it was made from, into one archive for somebody else."""
     from wristctl.records.archive import pack as write
@@ -92,7 +89,6 @@ def pack(
 def unpack(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="What `wristctl runs pack` wrote.")],
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Take the runs out of an archive, after checking that they are as they were sealed. Nothing in them is run.
 

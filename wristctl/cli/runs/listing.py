@@ -2,19 +2,19 @@
 
 import json
 import shlex
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, fields, replace
 from typing import Annotated, Any, get_args
 
 import typer
 
 from wristctl.cli.json_output import print_json
-from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, run_ids
+from wristctl.cli.options import RESULTS, Json, Out, Ref, run_ids
 from wristctl.cli.output import say
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import Argument, UserError, meant
 from wristctl.records import Run, open_run
-from wristctl.records.difference import Change, Difference, difference
+from wristctl.records.difference import Change, difference
 from wristctl.records.find import condition, entries, in_order, select
 from wristctl.records.index import IndexEntry
 from wristctl.records.lineage import ancestry, dependents
@@ -44,7 +44,6 @@ def ls(
         str | None, typer.Option("--columns", help="Fields and metrics to show: id,about,rmse,settling.")
     ] = None,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """List runs, oldest first: what each was about, and the metric that heads its page."""
     where = where or []
@@ -56,11 +55,8 @@ def ls(
     if as_json:
         print_json({"schema": "wristctl.runs/1", "runs": list(map(asdict, listed))})
     elif listed:
-        print(
-            (
-                _chosen(listed, columns) if columns else _table(listed, [sort, *(condition(text)[0] for text in where)])
-            ).text()
-        )
+        asked = [sort, *(condition(text)[0] for text in where)]
+        print((_chosen(listed, columns) if columns else _table(listed, asked)).text())
     else:
         say(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
 
@@ -110,7 +106,6 @@ def show(
     metrics: Annotated[bool, typer.Option("--metrics", help="Print every metric too.")] = False,
     out: Out = RESULTS,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """Show one run: its answer, command, state, inputs and files; metrics too where it has no answer."""
     run = open_run(ref, out)
@@ -170,7 +165,6 @@ def diff(
     all_: Annotated[bool, typer.Option("--all", help="Print every difference, not a summary of many.")] = False,
     out: Out = RESULTS,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """Show what differs between two runs: configuration, metrics, code, environment, inputs."""
     a, b = open_run(before, out), open_run(after, out)
@@ -186,39 +180,22 @@ def diff(
     print()
     if a.kind != b.kind:
         say(f"The runs are of different kinds: {a.kind} and {b.kind}.")
+    by_subject = [(title, changes) for name, title in _DIFF_TITLES.items() if (changes := getattr(differences, name))]
     if not all_ and (a.kind != b.kind or sum(map(len, vars(differences).values())) > _MANY):
-        for line in _diff_summary(differences):
-            say(line)
+        for title, changes in by_subject:
+            names = ", ".join(change.name for change in changes[:_FEW])
+            say(f"{title}: {names}" + f" and {len(changes) - _FEW} more" * (len(changes) > _FEW))
         say("every difference: --all")
         return
-    print("\n\n".join(table.text() for table in _diff_tables(differences)) or "nothing differs")
+    tables = [_diff_table(title, changes, changes is differences.metrics) for title, changes in by_subject]
+    print("\n\n".join(table.text() for table in tables) or "nothing differs")
 
 
-def _diff_summary(differences: Difference) -> Iterator[str]:
-    """A line for each subject in which the runs differ: in how many things, and the first of them."""
-    for title, changes in _by_subject(differences):
-        names = ", ".join(change.name for change in changes[:_FEW])
-        more = f" and {len(changes) - _FEW} more" * (len(changes) > _FEW)
-        yield f"{title}: {names}{more}"
-
-
-def _by_subject(differences: Difference) -> Iterator[tuple[str, list[Change]]]:
-    """Titles with what differs, in the order in which it is shown."""
-    for name, title in _DIFF_TITLES.items():
-        if changes := getattr(differences, name):
-            yield title, changes
-
-
-def _diff_tables(differences: Difference) -> Iterator[Table]:
-    for title, changes in _by_subject(differences):
-        if changes is differences.metrics:
-            rows = [
-                (change.name, change.before, change.after, *_change(change.before, change.after)) for change in changes
-            ]
-            yield Table(title, ("metric", "before", "after", "change", "change [%]"), rows)
-        else:
-            changed = [(change.name, _text(change.before), _text(change.after)) for change in changes]
-            yield Table(title, ("what", "before", "after"), changed)
+def _diff_table(title: str, changes: Sequence[Change], of_metrics: bool) -> Table:
+    if of_metrics:
+        rows = [(name, before, after, *_change(before, after)) for name, before, after in changes]
+        return Table(title, ("metric", "before", "after", "change", "change [%]"), rows)
+    return Table(title, ("what", "before", "after"), [(name, _text(a), _text(b)) for name, a, b in changes])
 
 
 def _change(before: Any, after: Any) -> tuple[float | None, float | None]:
@@ -231,7 +208,7 @@ def _text(value: Any) -> str:
     return "-" if value is None else str(value)
 
 
-def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
+def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False) -> None:
     """Show the runs that a run was made from, and those made from it."""
     run = open_run(ref, out)
     tree, users = ancestry(run), dependents(run, run.path.parent)
@@ -248,7 +225,6 @@ def tag(
     tags: Annotated[list[str] | None, typer.Argument(metavar="[TAG...]", help="Tags to add.")] = None,
     remove: Annotated[list[str] | None, typer.Option("--remove", help="A tag to take away; repeatable.")] = None,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Add tags to a run, or take them away; they stand in tags.json beside the runs."""
     run = open_run(ref, out)

@@ -3,20 +3,17 @@
 import hashlib
 import logging
 import webbrowser
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from wristctl.cli.command import asked_to_trust
-from wristctl.cli.options import RESULTS, Debug, Out, Quiet, TrustCode, run_ids
+from wristctl.cli.command import trusting
+from wristctl.cli.options import RESULTS, Out, Quiet, TrustCode, run_ids
 from wristctl.cli.output import say
 from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.drawing import draw_later
-from wristctl.commands.progress import no_event
 from wristctl.errors import TO, Argument, UserError
-from wristctl.plugins.trust import asking
 from wristctl.records import Run, open_run
 from wristctl.records.files import write_text
 from wristctl.records.find import entries
@@ -37,7 +34,6 @@ def report(
     ] = False,
     trust_code: TrustCode = False,
     quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Write a page about one run, about several beside each other, or about all: one HTML file without a network.
 
@@ -49,7 +45,7 @@ def report(
     if all_:
         return _write(to, out / "index.html", _page_of_all(out, quiet))
     runs = [open_run(ref, out) for ref in refs or ()]
-    with asking(partial(asked_to_trust, trust_code)):
+    with trusting(trust_code):
         text = _page_of(runs, all_figures, quiet)
     name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
     _write(to, runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html", text)
@@ -69,7 +65,7 @@ def _page_of_all(out: Path, quiet: bool) -> str:
 
     listed = entries(out)
     with listening(quiet, False) as console:  # noqa: SIM117 - it shows on the console
-        with progress(console, no_event, "drawing", len(listed), "pictures", quiet) as advance:
+        with progress(console, "drawing", quiet, len(listed), "pictures") as advance:
             return index_page(out, listed, advance)
 
 
@@ -91,7 +87,6 @@ def serve(
     out: Out = RESULTS,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port on this machine; 0: any.")] = 8010,
     browse: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
-    debug: Debug = False,
 ) -> None:
     """Show the page of all runs in a browser on this machine, kept fresh while runs come; Ctrl-C ends it.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wristctl.cli.json_output import print_json
-from wristctl.cli.options import RESULTS, Debug, Json, Out, run_ids
+from wristctl.cli.options import RESULTS, Json, Out, run_ids
 from wristctl.cli.output import say, write_picture
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import UserError
@@ -34,7 +34,6 @@ def trend(
     figure: Annotated[Path | None, typer.Option("--figure", help="The picture to write.")] = None,
     out: Out = RESULTS,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:  # fmt: skip
     """Say what of a rig drifts over its runs (exit code 3 if something does).
 

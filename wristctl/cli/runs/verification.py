@@ -7,26 +7,23 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import typer
 
-from wristctl.cli.command import asked_to_trust
+from wristctl.cli.command import trusting
 from wristctl.cli.json_output import print_json
-from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, TrustCode, run_ids
+from wristctl.cli.options import RESULTS, Json, Out, Ref, TrustCode, run_ids, set_option
 from wristctl.cli.output import say
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import inputs_of, procedure_of
-from wristctl.commands.progress import no_event
 from wristctl.config.former_names import OF_KINDS
 from wristctl.config.loop import comes_live
 from wristctl.errors import UserError
 from wristctl.plain_files import UNREADABLE, unreadable
 from wristctl.plugins.places import check_trust
-from wristctl.plugins.trust import asking
 from wristctl.processes import NO_HARDWARE, end_with_parent
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.difference import leaves_of
@@ -80,7 +77,6 @@ def verify(
     ] = None,
     out: Out = RESULTS,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """Hash every file of runs again and name each that is not as it was sealed (exit code 3).
 
@@ -93,7 +89,7 @@ def verify(
     quiet = len(paths) < _SHOWN
     with (
         listening(quiet, False) as console,
-        progress(console, no_event, "verifying", len(paths), "runs", quiet) as advance,
+        progress(console, "verifying", quiet, len(paths), "runs") as advance,
     ):
         for count, path in enumerate(paths, start=1):
             run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
@@ -155,7 +151,6 @@ def sign(
         Path, typer.Option("--key", help="Your private SSH key; where an agent holds it, the public one.")
     ] = KEY,
     out: Out = RESULTS,
-    debug: Debug = False,
 ) -> None:
     """Sign a run: with your SSH key, over the hashes of all its files. `verify --signed` checks it."""
     run = open_run(ref, out)
@@ -169,18 +164,15 @@ _SAME = ("identical", "within tolerance", "drawn now", "undrawn", "volatile")
 def replay(
     ref: Ref,
     out: Out = RESULTS,
-    override: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Repeat it with another setting.")
-    ] = None,
+    override: Annotated[list[str] | None, set_option("Repeat it with another setting.")] = None,
     trust_code: TrustCode = False,
     as_json: Json = False,
-    debug: Debug = False,
 ) -> None:
     """Run a run again in a scratch folder, and say of each file whether it came out the same (exit code 3 if not).
 
     The scratch folder is kept where something differs. A run on real hardware is refused: nothing here moves a motor.
     """
-    with asking(partial(asked_to_trust, trust_code)):
+    with trusting(trust_code):
         _replay(open_run(ref, out), override or [], as_json)
 
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _HEAVIEST, _BESIDE_A_BOX = 5, 3
 # Sample rate from which control is as good as continuous [kHz].
 _CONTINUOUS = 100.0
+# Verdict where motions or loops differ.
+_OPEN = "not specified enough"
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 _MORE = "Settling, pushes and every claim with its reason: add --all, or see report.html of the run."
 
@@ -100,15 +102,13 @@ def _controllers(claims: Sequence[Judgement]) -> list[str]:
         arrival = _one(j for j in labelled if j.claim.evidence == "arrival")
         number = _one(j for j in labelled if _is_number(j.claim, "rmse"))
         who = f"{who[0].upper()}{who[1:]}"
-        facts = [f"{_arrives(SHORT, not sentences)} {_places(arrival.found)}"] if arrival else []
-        if number and (not arrival or _ever(arrival.found) or _ever(number.found)):
+        within = f" (to within {_percent(SHORT)})" * (not sentences)
+        facts = [f"arrives{within} {_places(arrival.found)}"] if arrival else []
+        ever = [_where(one.found, verdict) for one in (arrival, number) if one for verdict in ("reproduced", _OPEN)]
+        if number and (not arrival or any(ever)):
             facts.append(f"has the paper's RMSE {_places(number.found)}{_beyond(number.found)}")
         sentences += [f"{who} {' and '.join(facts)}."] if facts else []
     return sentences
-
-
-def _arrives(short: float, first: bool) -> str:
-    return f"arrives (to within {_percent(short)})" if first else "arrives"
 
 
 def _is_number(claim: Claim, metric: str) -> bool:
@@ -142,17 +142,12 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     sentences = [f"SMC has a smaller RMSE than PID {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
-    tried = [link for link in links if link is not None]
+    tried = [link.found for link in links if link is not None]
     if len(tried) < len(links):
         return sentences
     named = [name.upper() for name in order if name not in ("smc", "pid")]
-    holds = [
-        loop
-        for loop in loops
-        if all(
-            (finding := link.found.get(loop)) and (finding.beside or finding.verdict) == "reproduced" for link in tried
-        )
-    ]
+    verdicts = {loop: {f[loop].beside or f[loop].verdict if loop in f else None for f in tried} for loop in loops}
+    holds = [loop for loop in loops if verdicts[loop] <= {"reproduced"}]
     return [
         *sentences,
         f"The paper's ranking ({', '.join(name.upper() for name in order)}) cannot be tested without equations of "
@@ -191,37 +186,30 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     """In which share of the settings that the paper may have had gains arrive, and give a whole row of T2."""
     from wristctl.comparison.paper import FACTOR
 
-    in_box = {evidence: [strip for strip in strips if strip.claim.evidence == evidence] for evidence in _IN_BOX}
+    told = ("arrival", "together")
+    in_box = {evidence: [strip for strip in strips if strip.claim.evidence == evidence] for evidence in told}
     used = [strip for parts in in_box.values() for strip in parts]
     if not used:
         return []
-    shares = {
-        evidence: joined([f"{_SHORT.get(strip.claim.label, strip.claim.label)} in {_share(strip)}" for strip in parts])
-        for evidence, parts in in_box.items()
-    }
+
+    def shares(evidence: str) -> str:
+        held = [(strip.claim.label, strip.share("reproduced")) for strip in in_box[evidence]]
+        told = [(label, _percent(share.value) if share.n else "no setting that converged") for label, share in held]
+        return joined([f"{_SHORT.get(label, label)} in {percent}" for label, percent in told])
+
     sentences = []
     if in_box["arrival"]:
         resting = any(strip.share("reproduced").times for strip in in_box["arrival"])
         also = " (also by wrists that rest there whatever is asked of them)" * resting
-        sentences.append(f"30 deg are reached with {shares['arrival']}{also}")
+        sentences.append(f"30 deg are reached with {shares('arrival')}{also}")
     if in_box["together"]:
         sentences.append(
-            f"all three numbers of Table 2 come out at once, within a factor of {FACTOR:g}, with {shares['together']}"
+            f"all three numbers of Table 2 come out at once, within a factor of {FACTOR:g}, with {shares('together')}"
         )
     left = sorted({strip.uncounted for strip in used})
     many = f"{left[0]} to {left[-1]}" if len(left) > 1 else f"{left[0]}"
     open_ = f" ({many} did not converge and are not counted)" * bool(left[-1])
     return [f"Of {len(strips[0].verdicts)} settings that the paper may have had{open_} {'; '.join(sentences)}."]
-
-
-# Claims over the box that the answer tells.
-_IN_BOX = ("arrival", "together")
-
-
-def _share(one: Strip) -> str:
-    """Share of the settings that have a verdict."""
-    held = one.share("reproduced")
-    return _percent(held.value) if held.n else "no setting that converged"
 
 
 def _networks(claims: Sequence[Judgement]) -> list[str]:
@@ -282,10 +270,14 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         return None
     units, rows = {_unit(j.claim) for j in heavy}, []
     for j in heavy:
-        ours = [_ours(j.claim, j.found[name]) if name in j.found else "not tried" for name in loops]
+        found = [j.found.get(name) for name in loops]
+        ours = [_range(j.claim, one.low, one.high) if one else "not tried" for one in found]
         unit = f" [{_unit(j.claim)}]" * (len(units) > 1 and bool(_unit(j.claim)))
-        paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
-        rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
+        value = float(j.claim.value or 0.0)
+        paper = _range(j.claim, value, value)
+        tried, holding = [name for name in j.found if name], _where(j.found, "reproduced")
+        agree = "all loops" if len(holding) == len(tried) else ", ".join(map(_word, holding)) or "no loop"
+        rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, agree))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
     rule = f"the range overlaps paper / {FACTOR:g} to paper x {FACTOR:g}"
     return Table(
@@ -300,29 +292,19 @@ def _unit(claim: Claim) -> str:
     return "deg" if claim.unit == "rad" else claim.unit
 
 
-def _ours(claim: Claim, finding: Finding) -> str:
-    return "fails" if math.isnan(finding.low) else _range(claim, finding.low, finding.high)
-
-
 def _range(claim: Claim, low: float, high: float) -> str:
     from wristctl.comparison.claims import interval
 
+    if math.isnan(low):
+        return "fails"
     if claim.unit != "rad":
         return interval(low, high)
     return " to ".join(dict.fromkeys((degrees(low), degrees(high))))
 
 
-def _agree(findings: Mapping[str, Finding]) -> str:
-    """The loops on which a number is reproduced, for a cell."""
-    loops, holding = [name for name in findings if name], _where(findings, "reproduced")
-    if len(holding) == len(loops):
-        return "all loops"
-    return ", ".join(map(_word, holding)) if holding else "no loop"
-
-
 def _places(findings: Mapping[str, Finding]) -> str:
     """On which loops something is so, on which for some motions only, and on which two are alike."""
-    loops, open_ = [name for name in findings if name], _where(findings, "not specified enough")
+    loops, open_ = [name for name in findings if name], _where(findings, _OPEN)
     alike = [name for name in open_ if findings[name].reason.startswith("alike")]
     some = [name for name in open_ if name not in alike]
     holding = _where(findings, "reproduced")
@@ -330,11 +312,6 @@ def _places(findings: Mapping[str, Finding]) -> str:
     places += [f"in one of two moves {_on(some, () if holding else loops)}"] * bool(some)
     places += [f"with equal errors {_on(alike)}"] * bool(alike)
     return ", ".join(places)
-
-
-def _ever(findings: Mapping[str, Finding]) -> bool:
-    """Whether something is so on some loop, in some motion at least."""
-    return bool(_where(findings, "reproduced") or _where(findings, "not specified enough"))
 
 
 def _on(holding: Sequence[str], loops: Iterable[str] = ()) -> str:

@@ -96,11 +96,9 @@ def audit(session: Session) -> Audited:
     from wristctl.commands.audit.ledger import ledger_tables
     from wristctl.comparison.claims import TRAININGS, Grounds, conditions_of, evidence_study, judge_all, ledger_frame
     from wristctl.comparison.robust import strips_frame
-    from wristctl.control.table import CONTROLLERS
 
     findings, inputs, study = session.findings, session.inputs, session.study
-    claims = study.audit.claims
-    loadable = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
+    claims, loadable = study.audit.claims, _loadable(study)
     compared = {}
     for loop, scale in conditions_of(loadable):
         name = loop if scale == 1.0 else f"{loop}-stiffness-{scale:g}"
@@ -188,6 +186,13 @@ def _check_trainings(claims: Sequence[Claim], inputs: Inputs) -> None:
             )
 
 
+def _loadable(study: Study) -> list[Claim]:
+    """The claims whose controller, if they have one, there is."""
+    from wristctl.control.table import CONTROLLERS
+
+    return [claim for claim in study.audit.claims if claim.controller is None or claim.controller in CONTROLLERS]
+
+
 def _evidence(session: Session, study: Study, label: str) -> Compared:
     """The comparison of a study, in a run directory of its own beside that of the audit."""
 
@@ -228,11 +233,10 @@ def judged_in_box(session: Session) -> list[Strip]:
     from wristctl.commands.audit.figures import shares, strip
     from wristctl.comparison.robust import draws_frame, rows_in_box, strips, strips_frame
     from wristctl.comparison.unknowns_sampling import continuous_settings, drawn_settings, react
-    from wristctl.control.table import CONTROLLERS
     from wristctl.study_files.sweeps import unit_at
 
     study, findings, box = session.study, session.findings, session.study.audit.box
-    claims = [claim for claim in study.audit.claims if claim.controller is None or claim.controller in CONTROLLERS]
+    claims = _loadable(study)
     rows = rows_in_box(claims)
     if not box.unknowns or not rows:
         return []
@@ -241,18 +245,12 @@ def judged_in_box(session: Session) -> list[Strip]:
     with session.progress("drawing settings from the box", total=100, unit="%") as report:
         share = len(rows) / (len(rows) + len(turned))
         drawn = react(rows, settings, lambda part: report(round(100 * share * part)))
-        symmetric = [row for row in rows if row.label in turned]
-        mirrored = react(
-            symmetric, settings, lambda part: report(round(100 * (share + (1 - share) * part))), mirrored=True
-        )
+        symmetric, rest = [row for row in rows if row.label in turned], 1.0 - share
+        mirrored = react(symmetric, settings, lambda part: report(round(100 * (share + rest * part))), mirrored=True)
     in_box = strips(claims, drawn, mirrored)
     findings.table("data/box.csv", strips_frame(in_box), *documented(_OF_BOX))
     findings.table("data/draws.csv", draws_frame(drawn))
-    specified = [
-        claim_strip
-        for claim_strip in in_box
-        if not claim_strip.claim.unspecified or claim_strip.claim.evidence == "symmetry"
-    ]
+    specified = [one for one in in_box if not one.claim.unspecified or one.claim.evidence == "symmetry"]
     heading = "In which of the settings that the paper may have had its claims hold"
     findings.figure("box", shares, specified or in_box, heading)
     for row_strip in in_box:

@@ -63,16 +63,12 @@ def shares(strips: Sequence[Strip], heading: str = "") -> Figure:
     panel.grid(False, axis="y")
     _beside(panel, len(strips) - 0.2, "holds in", 40.0, ha="right", fontsize=8.0)
     _beside(panel, len(strips) - 0.2, "by what decides most", 46.0, fontsize=8.0)
-    panel.set_xlabel(f"share of {counted(strips)}", fontsize=10.0)
+    draws, most = len(strips[0].verdicts), max(row.uncounted for row in strips)
+    counted = f"{draws} settings" + f", without up to {most} that did not converge" * bool(most)
+    panel.set_xlabel(f"share of {counted}", fontsize=10.0)
     headed(fig, heading)
     legend_below(fig, 2)
     return fig
-
-
-def counted(strips: Sequence[Strip]) -> str:
-    """Number of drawn settings, and the largest number that one claim does not count, in words."""
-    draws, most = len(strips[0].verdicts), max(row.uncounted for row in strips)
-    return f"{draws} settings" + f", without up to {most} that did not converge" * bool(most)
 
 
 def _beside(panel: Axes, place: float, text: str, right: float, **style: Any) -> None:

@@ -57,14 +57,8 @@ def _section(title: str, title_of_others: str, judged: Sequence[Judgement]) -> l
     heads, tables = ("claim", "says", "paper", "unit"), []
     if by_loop:
         pairs = [part for name in loops for part in (f"ours, {name}", f"verdict, {name}")]
-        rows = [
-            (
-                *_claim(j),
-                worded(j.claim, str(j.verdict)),
-                *(part for name in loops for part in _cells(j.claim, j.found.get(name))),
-            )
-            for j in by_loop
-        ]
+        cells = [[part for name in loops for part in _cells(j.claim, j.found.get(name))] for j in by_loop]
+        rows = [(*_claim(j), worded(j.claim, str(j.verdict)), *row) for j, row in zip(by_loop, cells, strict=True)]
         tables.append(Table(title, (*heads, "verdict", *pairs), rows))
     if remaining:
         sources = any(j.claim.source for j in remaining)
@@ -81,13 +75,9 @@ def _claim(judgement: Judgement) -> Iterator[str]:
     yield from (
         claim.id,
         claim.says,
-        "" if claim.value is None else _bound(claim.sense) + f"{claim.value:g}",
+        "" if claim.value is None else {"at most": "<= ", "at least": ">= "}.get(claim.sense, "") + f"{claim.value:g}",
         claim.unit,
     )
-
-
-def _bound(sense: str) -> str:
-    return {"at most": "<= ", "at least": ">= "}.get(sense, "")
 
 
 def _cells(claim: Claim, finding: Finding | None) -> tuple[str, str]:
@@ -97,9 +87,5 @@ def _cells(claim: Claim, finding: Finding | None) -> tuple[str, str]:
     if finding is None:
         return "", ""
     mark = f" ({finding.mark})" if finding.mark else ""
-    ours = (
-        ""
-        if finding.low != finding.low and not finding.reason.startswith("fails")
-        else interval(finding.low, finding.high)
-    )
-    return ours, worded(claim, finding.verdict) + mark
+    without = finding.low != finding.low and not finding.reason.startswith("fails")
+    return "" if without else interval(finding.low, finding.high), worded(claim, finding.verdict) + mark

@@ -15,7 +15,6 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
-from wristctl.config.camera import CalibrateCameraSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 
@@ -35,8 +34,11 @@ _PATIENCE = 20.0
 
 def look(session: Session) -> Album:
     """The views. Raises UserError where a source gives no pictures, or shows no board where it must."""
+    import numpy as np
+
     from wristctl.vision.camera import FolderCamera, is_device, open_recording
     from wristctl.vision.charuco import Album
+    from wristctl.vision.scene import board_shots
 
     settings, findings, names = session.study.calibrate_camera, session.findings, []
     frames: Iterable[Frame]
@@ -44,7 +46,9 @@ def look(session: Session) -> Album:
     live = settings.camera is not None and is_device(source)
     if settings.camera is None:
         log.info("no camera named, so views are rendered (--camera 0, a video, or a folder)")
-        album, names, frames = Album(settings.board), [str(k) for k in range(settings.views)], _rendered(session)
+        rng = np.random.default_rng(findings.stream("board shots"))
+        album, names = Album(settings.board), [str(k) for k in range(settings.views)]
+        frames = board_shots(settings.scene, settings.board, settings.views, rng)
     elif live:
         album = Album(settings.board, settings.views)
         frames = _live(session, album)
@@ -75,16 +79,6 @@ def _keep(file: Path | None, picture: Image) -> None:
 
     if file is not None:
         cv2.imwrite(str(file), picture)
-
-
-def _rendered(session: Session) -> Iterator[Frame]:
-    import numpy as np
-
-    from wristctl.vision.scene import board_shots
-
-    settings = session.study.calibrate_camera
-    rng = np.random.default_rng(session.findings.stream("board shots"))
-    return board_shots(settings.scene, settings.board, settings.views, rng)
 
 
 def _live(session: Session, album: Album) -> Iterator[Frame]:
@@ -164,7 +158,7 @@ def calibrate_camera(session: Session) -> CameraCalibrated:
 
     from wristctl.commands.calibrate.figures import lens, plane, reprojection
     from wristctl.vision.charuco import calibrate, plane_tilt
-    from wristctl.vision.view import FILE
+    from wristctl.vision.view import FILE, Pinhole
 
     cv2.setNumThreads(1)
     findings, settings = session.findings, session.study.calibrate_camera
@@ -200,7 +194,9 @@ def calibrate_camera(session: Session) -> CameraCalibrated:
     names = [f"{name} [{unit}]" if unit else name for name, unit in _LENS]
     rows: list[tuple[object, ...]] = list(zip(names, map(float, values), calibration.deviation.tolist(), strict=True))
     if settings.camera is None:
-        rows = [(*row, true) for row, true in zip(rows, _true_lens(settings), strict=True)]
+        camera = Pinhole(settings.scene, "right")
+        truth = [*camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), *camera.distortion.tolist()]
+        rows = [(*row, true) for row, true in zip(rows, truth, strict=True)]
     summary = [
         ("views", len(album.views)),
         ("pictures", album.pictures),
@@ -224,14 +220,6 @@ def _corners(album: Album, calibration: CameraCalibration) -> pd.DataFrame:
     numbers = np.concatenate([view.numbers for view in album.views])
     columns = (names, numbers, *corners.T, *off.T)
     return pd.DataFrame(dict(zip(_MEANING, columns, strict=True)))
-
-
-def _true_lens(settings: CalibrateCameraSettings) -> list[float]:
-    """Lens of rendered views, in the order of _LENS."""
-    from wristctl.vision.view import Pinhole
-
-    camera = Pinhole(settings.scene, "right")
-    return [*camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), *camera.distortion.tolist()]
 
 
 CALIBRATE_CAMERA = Procedure("calibrate-camera", plan, calibrate_camera, in_one_plane=no_tendons)

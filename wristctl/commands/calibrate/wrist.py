@@ -28,31 +28,23 @@ _COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class WristCalibrated(StudyResult):
-    """Position where each tendon is just taut on the straight wrist, and the sense of its motor."""
-
-    kind = "calibrate-wrist"
-
-    calibration: WristCalibration
-
-    def frame(self) -> pd.DataFrame:
-        """One row per tendon."""
-        import pandas as pd
-
-        return pd.DataFrame(self.tables[0].rows, columns=_COLUMNS)
-
-
-@dataclass(frozen=True, repr=False, eq=False)
 class AxisFound(StudyResult):
     """Sense of one motor, and the slack of its tendon."""
 
     kind = "calibrate-wrist"
 
     def frame(self) -> pd.DataFrame:
-        """One row."""
+        """One row per tendon."""
         import pandas as pd
 
         return pd.DataFrame(self.tables[0].rows, columns=list(self.tables[0].columns))
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class WristCalibrated(AxisFound):
+    """Position where each tendon is just taut on the straight wrist, and the sense of its motor."""
+
+    calibration: WristCalibration
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -65,7 +57,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"{describe_rig(settings)}\neach motor reels in by at most {slack:g} mm until its tendon bends the wrist"
 
 
-def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
+def calibrate_wrist(session: Session) -> AxisFound:
     """Find where each tendon is just taut on the straight wrist, which way its motor turns, and steps per radian.
 
     The wrist stands straight, its tendons slack, both markers in the camera's picture. Later runs reuse what is
@@ -137,7 +129,7 @@ def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
     return AxisFound(study, findings, [Table("One axis", columns, [row])])
 
 
-CALIBRATE_WRIST: Procedure[WristCalibrated | AxisFound] = Procedure(
+CALIBRATE_WRIST: Procedure[AxisFound] = Procedure(
     "calibrate-wrist",
     plan,
     calibrate_wrist,

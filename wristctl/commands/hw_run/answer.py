@@ -196,14 +196,11 @@ class Swings(NamedTuple):
     """Of the same trials in simulation."""
 
     @property
-    def rig(self) -> Mask:
-        """In which trials the rig swings, (N,): by its true angle where that is known."""
+    def known(self) -> Array:
+        """By the true angle where that is known, else by the estimated one."""
         import numpy as np
 
-        from wristctl.simulation.oscillation import LIMIT_CYCLE
-
-        swings: Mask = np.where(np.isnan(self.true), self.seen, self.true) > 2.0 * LIMIT_CYCLE
-        return swings
+        return np.where(np.isnan(self.true), self.seen, self.true)
 
     def largest(self, among: Mask | slice = slice(None)) -> str:
         """The largest, among these trials, as seen and, where that is known, as it truly is."""
@@ -213,14 +210,6 @@ class Swings(NamedTuple):
         known = true[np.isfinite(true)]
         truly = f" (truly {degrees(float(known.max()))} deg)" if len(known) else ""
         return f"{degrees(float(self.seen[among].max()))} deg peak to peak at rest{truly}"
-
-    @property
-    def simulation(self) -> Mask:
-        """In which trials their simulation swings, (N,)."""
-        from wristctl.simulation.oscillation import LIMIT_CYCLE
-
-        swings: Mask = self.simulated > 2.0 * LIMIT_CYCLE
-        return swings
 
 
 def swings_of(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> Swings:
@@ -253,7 +242,7 @@ def marks_of(trials: pd.DataFrame, twins: Mapping[int, Simulation], tension_rang
     goals = np.array([size_of(course.bend_ref).max() if rests(course) else np.inf for course in courses])
     short = done["steady_state"].to_numpy(float) > SHORT * goals
     swings = swings_of(done, twins)
-    swinging = swings.rig | (swings.seen > 2.0 * LIMIT_CYCLE)
+    swinging = np.fmax(swings.known, swings.seen) > 2.0 * LIMIT_CYCLE
     size = swings.largest(swinging) if swinging.any() else ""
     found = {"does not arrive": short, f"swings by up to {size}": swinging, "chatters": chatters}
     return [f"{mark}: {int(where.sum())} of {len(done)} trials" for mark, where in found.items() if where.any()]
@@ -266,21 +255,21 @@ def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[st
     """
     import numpy as np
 
+    from wristctl.simulation.oscillation import LIMIT_CYCLE
+
     swings, notes = swings_of(done, twins), []
-    rig = np.where(np.isnan(swings.true), swings.seen, swings.true)
-    for where, one, other, kinder in (
-        (swings.rig & ~swings.simulation, rig, swings.simulated, "the simulation is kinder than the rig"),
-        (swings.simulation & ~swings.rig, swings.simulated, rig, "the rig is kinder than the simulation"),
-    ):
-        if not where.any():
-            continue
-        worst = int(np.argmax(np.where(where, one - other, -np.inf)))
-        swinging, resting = ("rig", "simulation") if one is rig else ("simulation", "rig")
-        notes.append(
-            f"In {int(where.sum())} of {len(done)} trials the {swinging} swings at rest, by up to "
-            f"{degrees(float(one[worst]))} deg peak to peak, where the {resting} has {degrees(float(other[worst]))} "
-            f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg."
-        )
+    both = {"rig": swings.known, "simulation": swings.simulated}
+    for swinging, resting in (("rig", "simulation"), ("simulation", "rig")):
+        one, other = both[swinging], both[resting]
+        where = (one > 2.0 * LIMIT_CYCLE) & ~(other > 2.0 * LIMIT_CYCLE)
+        if where.any():
+            worst = int(np.argmax(np.where(where, one - other, -np.inf)))
+            notes.append(
+                f"In {int(where.sum())} of {len(done)} trials the {swinging} swings at rest, by up to "
+                f"{degrees(float(one[worst]))} deg peak to peak, where the {resting} has "
+                f"{degrees(float(other[worst]))} deg: the {resting} is kinder than the {swinging}, by "
+                f"{degrees(float(one[worst] - other[worst]))} deg."
+            )
     return notes
 
 

@@ -52,7 +52,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("hw-run"):
         check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
         if settings.planes == 1 and not settings.reference.is_live:
-            check_reach([settings.reference], _as_modelled(settings, known), "reference")
+            from wristctl.trial.rig_belief import layout_of_rig
+            from wristctl.trial.rig_settings import as_modelled
+
+            modelled = as_modelled(known, layout_of_rig(settings, known), settings.planes)
+            check_reach([settings.reference], modelled, "reference")
         elif settings.planes == 2:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
@@ -67,13 +71,6 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
 
-def _as_modelled(settings: HwRunSettings, wrist: WristParameters) -> WristParameters:
-    from wristctl.trial.rig_belief import layout_of_rig
-    from wristctl.trial.rig_settings import as_modelled
-
-    return as_modelled(wrist, layout_of_rig(settings, wrist), settings.planes)
-
-
 def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> None:
     """UserError for motions or controllers of trials in two planes that cannot be."""
     from wristctl.control.table import controller
@@ -84,7 +81,10 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     from wristctl.trial.trials import motions_of
 
     if layout_of_rig(settings, wrist) is not None and settings.rig is None:
-        _check_of_the_paper(settings)
+        for key in ("load_cells", "calibration"):
+            if getattr(settings, key):
+                problem = f"{key} of a board are of the tendons 1, 2, 4 and 5, and this wrist has others"
+                raise UserError(problem, key, "leave it out: the wrist is homed anew")
     check_two_planes([World(settings.loop, wrist)])
     through = settings.reference.inverse == "network"
     for name in () if through else motions_of(settings):
@@ -93,34 +93,19 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
         controller(row.controller)
 
 
-def _check_of_the_paper(settings: HwRunSettings) -> None:
-    """UserError for what a board has of the paper's four tendons alone."""
-    for key in ("load_cells", "calibration"):
-        if getattr(settings, key):
-            problem = f"{key} of a board are of the tendons 1, 2, 4 and 5, and this wrist has others"
-            raise UserError(problem, key, "leave it out: the wrist is homed anew")
-
-
-def _planes_of_network(settings: HwRunSettings) -> int:
-    """Planes in which a network stands behind the reference: two of a path, one of a motion toward a direction."""
-    from wristctl.trial.motions import has_path
-
-    return 2 if settings.planes == 2 and has_path(settings) else 1
-
-
 def hw_run(session: Session) -> Performed:
     """Perform trials, emulated or on hardware: in four directions or both planes at once, with and without a push."""
     session.operator.tell(describe_rig(session.study.hw_run))
     warn_of_first_repetitions(session.study.hw_run.rows)
     from wristctl.commands.hw_run.trials import perform_trials
+    from wristctl.trial.motions import has_path
 
     study, bench = session.study, session.study.wrist
     identified_session = replace(session, study=identified(study, "hw-run", session.inputs))
     believed = identified_session.study.hw_run
-    network, tuned = (
-        network_for(session.inputs, identified_session.study.wrist, [believed.loop], _planes_of_network(believed)),
-        tuned_gains(session.inputs),
-    )
+    planes = 2 if believed.planes == 2 and has_path(believed) else 1  # of a network: two of a path
+    network = network_for(session.inputs, identified_session.study.wrist, [believed.loop], planes)
+    tuned = tuned_gains(session.inputs)
     if believed.port is None and believed.rig is None:
         warn_outside_conditions(believed.rows, [believed.loop])
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +78,8 @@ class Performed(StudyResult):
 
 def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Performed:
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
+    import pandas as pd
+
     from wristctl.commands.hw_run.figures import draw_trials
 
     findings, done = session.findings, completed(trials)
@@ -89,7 +91,9 @@ def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, t
     with session.drawing():
         draw_trials(session, done, twins)
     title = "Means over the trials" + ", beside the paper's experiment with the same law" * theirs
-    columns = ("label", "trials", *_measured(known_means(compared), rows))
+    # of a real rig nothing is true, and without a push nothing recovers
+    measured = (name for name in known_means(compared) if any(pd.notna(row.get(name)) for row in rows))
+    columns = ("label", "trials", *measured)
     of_trials = [name for name in _OF_A_TRIAL if name in done]
     tables = [
         table_of(title, quantities(columns), rows),
@@ -97,13 +101,6 @@ def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, t
     ]
     findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "settling", "pushed_true_rmse")
     return Performed(session.study, findings, tables, trials, twins)
-
-
-def _measured(names: Iterable[str], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Names that have a value in a row: of a real rig nothing is true, and without a push nothing recovers."""
-    import pandas as pd
-
-    return [name for name in names if any(pd.notna(row.get(name)) for row in rows)]
 
 
 def twins_of(
