@@ -50,6 +50,7 @@ def test_an_emulated_rig_with_weak_springs_misses_less_without_feedback_once_it_
             f"bench: {{person: {{takes: 0}}}}, homing: {{frames: 4, rest: 0.1, let_go: 0.6, stretch: {stretch}}}}}",
             f"wrist.tendons={tendons}",
             "wrist.gravity=[9.81, 0.0]",
+            "wrist.stiffness=1.5",
         )
         (done,) = rehearse(with_planes(study))
         assert done.outcome == "ok"
