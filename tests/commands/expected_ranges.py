@@ -170,11 +170,11 @@ def _cell(fact: Mapping[str, Any] | None) -> str:
 _HEAD = """
 # How wide the range of the expected error is, and why
 
-`recommend` says in which range 95 of 100 simulated rigs err in the trial. Here is that range for wrists of
-[these](hardware/recommended-rigs.md) with one controller, the scaled preset of ct-dob: over 200 rigs, with the share of
-100 others within it. `believed`: trials wind by the stretch of tendons as they are believed, and date pictures by a
-delay that may be a frame off. `measured`: as `recommend` does now, the steps per radian of homing tell the stretch, and
-the check of a rig the age of pictures. Rigs whose motors stand at their limit are not counted. The last column has true
+`recommend` says in which range 95 of 100 simulated rigs err in the trial. The table has that range for wrists drawn as
+[these](hardware/recommended-rigs.md). All have the scaled preset of ct-dob: 200 rigs, and the share of 100 others
+within that range. `believed`: trials wind by the stretch of tendons as they are believed, and date pictures by a delay
+that may be a frame off. `measured`: as `recommend` does now, the steps per radian of homing tell the stretch, and the
+check of a rig the age of pictures. Rigs whose motors stand at their limit are not counted. The last column has true
 errors of the emulated rig, where it was tried. `python -m tests.commands.expected_ranges --emulated` goes on there.
 """
 _LEFT = """
