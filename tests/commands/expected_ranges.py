@@ -2,9 +2,9 @@
 
 `python -m tests.commands.expected_ranges` takes five of the wrists of `recommended_rigs` with one controller, the
 scaled preset of ct-dob: no search, so a minute or two a wrist. The range over simulated rigs stands beside the share of
-fresh rigs within it, with tendons that stretch as believed and as homing measures; then each fact is known while all
-others are drawn. `--emulated` has the emulated rig's true errors too. What has ended is kept; a later call goes on
-there. Writes docs/expected-range.md.
+fresh rigs within it, with tendons that stretch as believed and as homing measures. With `--facts` each fact is known
+while all others are drawn; `--emulated` has the emulated rig's true errors too. What has ended is kept; a later call
+goes on there. Writes docs/expected-range.md.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def preset(study: Study) -> Candidate:
 
 
 def tried_out(number: int) -> dict[str, Any]:
-    """Ranges [deg] and what they hold, by the way in which trials wind, and what each fact does to the second one."""
+    """Ranges [deg] and the share of fresh rigs within them, by the way in which trials wind."""
     planes, reach = asked_of(number)
     found: dict[str, Any] = {"reach_deg": reach}
     for way in WAYS:
@@ -94,12 +94,21 @@ def tried_out(number: int) -> dict[str, Any]:
         low, _, high = ends = spread(rigs)
         within = float(np.mean((fresh >= low) & (fresh <= high)))
         found[way] = {"range": np.degrees(ends), "rigs": len(rigs), "fresh": len(fresh), "within": within}
-    every, left = float(np.log(rigs).var()), dict[str, Any]()
+    return found
+
+
+def left_of(number: int) -> dict[str, Any]:
+    """Of each fact the share of the variance of ln RMSE that goes once it is as believed, and the range left [deg]."""
+    planes, reach = asked_of(number)
+    study = study_of(number, WAYS[1])
+    best, (motions, horizon) = preset(study), motions_of_trial(study, reach, planes)
+    asked = asked_for(family_of_rigs(study, reach), motions, horizon)
+    every, left = float(np.log(rigs_asked(study, best, asked).following).var()), dict[str, Any]()
     for name, keys in FACTS.items():
         if set(keys) & set(asked.draw):
             others = rigs_asked(study, best, _drawing(asked, set(asked.draw) - set(keys))).following
             left[name] = {"gone": 1.0 - float(np.log(others).var()) / every, "range": np.degrees(spread(others))}
-    return found | {"facts": left}
+    return left
 
 
 def _drawing(asked: Family, keys: Collection[str]) -> Family:
@@ -120,7 +129,9 @@ def emulated(number: int) -> list[float]:
     return errors
 
 
-def page(rows: Mapping[int, dict[str, Any]], truths: Mapping[int, Sequence[float]]) -> str:
+def page(
+    rows: Mapping[int, dict[str, Any]], truths: Mapping[int, Sequence[float]], facts: Mapping[int, dict[str, Any]]
+) -> str:
     """A row for each wrist and way, then what each fact leaves of a range once it is known."""
     names = {number: _named(number) for number in rows}
     lines = [_HEAD.strip(), "", "| wrist, angle | stretch | 95 of 100 rigs [deg] | half by at most | factor | "
@@ -133,9 +144,12 @@ def page(rows: Mapping[int, dict[str, Any]], truths: Mapping[int, Sequence[float
                 f"| {names[number]}, {found['reach_deg']:.0f} deg | {way} | {low:.2g} to {high:.2g} | {median:.2g} | "
                 f"{high / low:.1f} | {100.0 * found[way]['within']:.0f} % of {found[way]['fresh']} | {true or '-'} |"
             )
-    lines += ["", _LEFT.strip(), "", f"| known | {' | '.join(names.values())} |", "|---" * (1 + len(names)) + "|"]
+    if not facts:
+        return "\n".join(lines) + "\n"
+    heads = [names[number] for number in facts]
+    lines += ["", _LEFT.strip(), "", f"| known | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
     for name in FACTS:
-        cells = [_cell(found["facts"].get(name)) for found in rows.values()]
+        cells = [_cell(found.get(name)) for found in facts.values()]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -155,11 +169,11 @@ def _cell(fact: Mapping[str, Any] | None) -> str:
 _HEAD = """
 # How wide the range of the expected error is, and why
 
-`recommend` says in which range 95 of 100 simulated rigs err in the trial. Here is that range for wrists of
-[these](hardware/recommended-rigs.md) with one controller, the scaled preset of ct-dob: over 200 rigs, with the share of
-100 others within it. `believed`: trials wind by the stretch of tendons as they are believed, and date pictures by a
-delay that may be a frame off. `measured`: as `recommend` does now, the steps per radian of homing tell the stretch, and
-the check of a rig the age of pictures. Rigs whose motors stand at their limit are not counted. The last column has true
+`recommend` says in which range 95 of 100 simulated rigs err in the trial. The table has that range for wrists drawn as
+[these](hardware/recommended-rigs.md). All have the scaled preset of ct-dob: 200 rigs, and the share of 100 others
+within that range. `believed`: trials wind by the stretch of tendons as they are believed, and date pictures by a delay
+that may be a frame off. `measured`: as `recommend` does now, the steps per radian of homing tell the stretch, and the
+check of a rig the age of pictures. Rigs whose motors stand at their limit are not counted. The last column has true
 errors of the emulated rig, where it was tried. `python -m tests.commands.expected_ranges --emulated` goes on there.
 """
 _LEFT = """
@@ -172,15 +186,18 @@ def main() -> int:
     """Try wrists and write the page."""
     parser = options(__doc__, len(WRISTS), "expected-ranges")
     parser.add_argument("--emulated", action="store_true", help="the emulated rig, too")
+    parser.add_argument("--facts", action="store_true", help="each fact known, too")
     asked = parser.parse_args()
     for number in WRISTS[asked.first : asked.first + asked.count]:
         one = argparse.Namespace(kept=asked.kept, first=number, count=1)
         print(*tried(one, tried_out), flush=True)
         if asked.emulated:
             print(*tried(one, emulated, "emulated"), flush=True)
-    rows, truths = ({n: json.loads(_kept(asked.kept / part, n).read_text()) for n in WRISTS
-                     if _kept(asked.kept / part, n).is_file()} for part in ("", "emulated"))  # fmt: skip
-    PAGE.write_text(page(rows, truths))
+        if asked.facts:
+            print(*tried(one, left_of, "facts"), flush=True)
+    rows, truths, facts = ({n: json.loads(_kept(asked.kept / part, n).read_text()) for n in WRISTS
+                     if _kept(asked.kept / part, n).is_file()} for part in ("", "emulated", "facts"))  # fmt: skip
+    PAGE.write_text(page(rows, truths, facts))
     return 0
 
 

@@ -49,19 +49,22 @@ def test_a_radian_takes_the_tendons_radius_and_a_pull_that_bends_the_springs(ten
 
 def test_springs_tendons_and_sheaths_come_in_as_the_stretch_that_they_make() -> None:
     assert told(rig()) == pytest.approx(20e3, rel=1e-9)
-    for share in (0.7, 1.3):
+    for share in (0.85, 1.2):
         assert told(rig(stiffness=f"x{share}")) == pytest.approx(20e3 / share, rel=1e-9)
         assert told(rig(stiffness_scale=share)) == pytest.approx(20e3 / share, rel=1e-9)
         assert told(rig(actuator={"tendon_stiffness": f"x{share}"})) == pytest.approx(20e3 * share, rel=1e-9)
-    rubs = rig(actuator={"friction": 0.2, "sheath": 1.5})
-    assert told(rubs) == pytest.approx(20e3 * math.exp(-0.3), rel=1e-9)
+    rubs = rig(actuator={"friction": 0.1, "sheath": 1.5})
+    assert told(rubs) == pytest.approx(20e3 * math.exp(-0.15), rel=1e-9)
     longer = told(rig(tendon_radius="x1.02"))
     assert told(rig(tendon_radius="x0.98")) > 20e3 > longer, "a lever that differs is taken for stretch"
 
 
 def test_what_no_tendon_can_be_is_not_believed() -> None:
-    """Less than half or more than twice what is believed, and what needs no stretch at all."""
-    assert told(rig(stiffness="x6")) == 10e3 and told(rig(stiffness="x0.1")) == 40e3
+    """Less than 0.8 or more than twice what is believed, and what needs no stretch at all.
+
+    A controller's gain rises as that falls: a heavy hand on tendons that sheaths make seem soft would swing.
+    """
+    assert told(rig(stiffness="x6")) == 16e3 and told(rig(stiffness="x0.1")) == 40e3
     assert told(rig(tendon_radius="x0.8")) == 40e3
     assert stiffness_by_length(15e3, 60.0, 3e-3) == 20e3 and stiffness_by_length(15e3, 60.0, -1e-3) == 30e3
     ideal = Loop(plant=rig(stiffness="x0.7").plant)
@@ -73,11 +76,11 @@ def test_homing_errs_as_the_noise_of_its_camera_does() -> None:
     noisy = {"sensor": {"level": "camera", "noise_deg": 0.1}}
     loop = Loop.model_validate(RIG | noisy)
     rigid, pull = length_per_radian(WEIGHTLESS)
-    lengths = [rigid + pull / told(loop, error=side) for side in (-1.0, 0.0, 1.0)]
+    lengths = [rigid + pull / told(loop, error=side) for side in (-0.2, 0.0, 0.2)]
     assert lengths[1] - lengths[0] == pytest.approx(lengths[2] - lengths[1]) and lengths[1] == pytest.approx(
         rigid + pull / 20e3
     )
-    assert 0.015 < (lengths[2] - lengths[1]) / lengths[1] < 0.03
+    assert 0.015 < (lengths[2] - lengths[1]) / lengths[1] / 0.2 < 0.03
     calm = Loop.model_validate(RIG | {"sensor": {"level": "camera", "noise_deg": 0.0}})
     assert told(calm, error=2.0) == pytest.approx(20e3, rel=1e-9)
 
@@ -86,7 +89,7 @@ def test_homing_errs_as_the_noise_of_its_camera_does() -> None:
 @pytest.mark.parametrize("tendons", ["four", "three"])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(
-    "plant", [{"stiffness": "x0.6"}, {"stiffness": "x1.4", "actuator": {"tendon_stiffness": "x0.7"}}]
+    "plant", [{"stiffness": "x0.6"}, {"stiffness": "x0.8", "actuator": {"tendon_stiffness": "x1.4"}}]
 )
 def test_a_homed_rig_holds_without_feedback_what_is_wanted(tendons: Any, side: float, plant: dict[str, Any]) -> None:
     """Spools that wind as far as homing says leave a small part of the error that believed stretch makes."""

@@ -43,8 +43,8 @@ def length_per_radian(wrist: WristParameters) -> tuple[float, float]:
 
 
 def stiffness_by_length(believed: float, pull: float, stretch: float) -> float:
-    """Stiffness [N/m] of a tendon that a pull [N] stretches by so much [m], between half and twice the believed one.
+    """Stiffness [N/m] of a tendon that a pull [N] stretches by so much [m], between 0.8 and twice the believed one.
 
     A controller's gain goes with it, and of a soft wrist stretch is a small part of the path that is measured.
     """
-    return min(2.0 * believed, max(0.5 * believed, pull / stretch)) if stretch > 0.0 else 2.0 * believed
+    return min(2.0 * believed, max(0.8 * believed, pull / stretch)) if stretch > 0.0 else 2.0 * believed
