@@ -247,6 +247,7 @@ class RecommendArguments(SharedArguments, total=False):
     controllers: Sequence[str]
     loop: LoopKeys
     draw: Mapping[str, str | Sequence[bool | int | float | str]]
+    known: Mapping[str, str | Sequence[bool | int | float | str]]
     references: Sequence[ReferenceKeys]
     horizon: float  # s
     largest_deg: float  # deg

@@ -19,10 +19,12 @@ LOGARITHMS = {name for name, each in UNKNOWNS.items() if each.log}
 
 
 def test_the_table_holds_what_a_study_may_fix_and_all_but_the_delay_is_simulated() -> None:
-    assert set(UNKNOWNS) == set(Fixed.model_fields)
+    of_loops = {"inner_friction", "inner_presliding_deg"}
+    assert set(UNKNOWNS) == set(Fixed.model_fields) - of_loops, "a measured loop of hysteresis has two of its own"
     assert {name: each.unit for name, each in UNKNOWNS.items()} == {
         name: (each.json_schema_extra or {})["unit"] if isinstance(each.json_schema_extra, dict) else ""
         for name, each in Fixed.model_fields.items()
+        if name not in of_loops
     }
 
 
