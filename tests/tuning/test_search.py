@@ -231,7 +231,8 @@ def test_a_search_tells_of_which_controllers_the_best_gains_chatter_and_how_ofte
         judged.append((law.name, dict(zip(law.gains, gains.tolist(), strict=True)), len(cases)))
         return {"limit cycle": 1, "chatters": 2} if law.name == "pd-ff" else {}
 
-    monkeypatch.setattr("wristctl.tuning.objective.marks_of", counted)
+    for module in ("wristctl.tuning.objective", "wristctl.commands.tune.answer"):
+        monkeypatch.setattr(f"{module}.marks_of", counted)
     small = ["tune.controllers=[pid-ff, pd-ff]", "tune.iterations=1", "tune.candidates=2"]
     done = wristctl.tune(load_study([], [*small, *(f"tune.{each}" for each in SETTINGS[:1] + SETTINGS[3:])]))
     assert done.lost == {"pid-ff": {}, "pd-ff": {"limit cycle": 1, "chatters": 2}}

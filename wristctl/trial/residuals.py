@@ -125,7 +125,7 @@ RESIDUALS: Mapping[str, Residual] = {
         _COUNT, "1 where the board is not ENABLED", lambda s: 0.0, math.inf, "home again", "the board is not ENABLED"
     ),
     "jump": Residual(
-        _DEG, "marker against where spools should have it, change within 40 ms or from a frame to the next",
+        _DEG, "marker against where spools should have it, change between two frames",
         lambda s: math.radians(s.safety.jump_deg), 0.5, "the tip's marker has slipped; pictures shown or dated wrongly",
         "the marker's angle jumps by {value} off its motors, beyond {limit}",
         "{value} of jump off its motors (limit {limit})",

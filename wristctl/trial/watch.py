@@ -34,8 +34,6 @@ _HISTORY, _SWINGING = 0.2, 1.0
 _TICKS, _EVENTS, _SEEN = 0.5, 1.0, 2.0
 # Periods after which spools' steps that were counted are old: those of the tick before are one.
 _UNHEARD = 2.5
-# Seconds over which a marker's jump is seen: two pictures of 60 a second, and always one. Of looks always one.
-_JUMPED = 0.04
 # Share of the limit on a bend across by which what stands may seem to bend.
 _DOUBTFUL = 0.5
 _FOLLOWING = "jump", "across", "load", "apart"
@@ -95,7 +93,7 @@ class Watch:
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
-        self.limits, self._own, self._jumped = limits_of(settings), own, 0.0 if own else _JUMPED
+        self.limits, self._own = limits_of(settings), own
         self._judge = Judge(self.limits)
         self._past: deque[_Past] = deque()
         self._positions: deque[Array] = deque(maxlen=round(_SWINGING / self._period))
@@ -226,11 +224,10 @@ class Watch:
         return {"jump": _size(jumps), "across": across, "load": load, "apart": _size([each.apart for each in frames])}
 
     def _before(self, camera: int) -> Frame:
-        """The frame of a camera that its newest one is compared with; without one before it that one itself."""
+        """The frame of a camera before its newest one; without one before it that one itself."""
         frames = [past.frames[camera] for past in self._past]
         earlier = [frame for frame in frames if frame.captured < frames[-1].captured]
-        near = [frame for frame in earlier if frames[-1].captured - frame.captured <= self._jumped]
-        return (near or earlier[-1:] or frames[-1:])[0]
+        return (earlier[-1:] or frames[-1:])[0]
 
     def _of_timing(self, clock: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))
