@@ -29,7 +29,7 @@ from tests.trial.single_trials import Ended, performed
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.motion_limit import held_pull, reeled_unseen
+from wristctl.trial.motion_limit import borne, held_pull, reeled_unseen
 
 PAGE = Path(__file__).parents[2] / "docs" / "hardware" / "largest-pulls.md"
 CURRENTS: dict[str, dict[str, Any]] = {
@@ -200,7 +200,7 @@ def told(current: str, motion: str, limit: float) -> float:
 
 def is_refused(current: str, motion: str, limit: float) -> bool:
     """Whether real motors do not move so unless `--force` is given."""
-    return told(current, motion, limit) > _settings(current, motion).within(WRIST).safety.tension
+    return told(current, motion, limit) > borne(_settings(current, motion))
 
 
 def beyond(table: Table) -> list[tuple[Case, str, str]]:

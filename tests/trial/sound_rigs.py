@@ -101,7 +101,7 @@ def page(ends: dict[int, Ended]) -> str:
     """The table: a row for each rig."""
     stopped, left = sum(ended.outcome != "ok" for ended in ends.values()), RIGS - len(ends)
     told = f"""
-        {len(ends)} sound rigs were drawn, homed and tried once: stopped were {stopped}. Drawn are springs of 0.6 to 1.2
+        {len(ends)} sound rigs were drawn, homed and tried once; stopped: {stopped}. Drawn are springs of 0.6 to 1.2
         of what is believed, tendons of 5 to 50 kN/m (believed: 20), pulleys, sheaths of 0 to 2 rad, friction, creep,
         poses and lenses of cameras, light, latency and USB adapter. Every second wrist has another length, stiffness
         and hand, and gains scaled to it; gains are 0.7 to 1.2 of the preset `hardware`; every fourth hand takes up a

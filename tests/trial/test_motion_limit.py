@@ -21,7 +21,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
-from wristctl.trial.motion_limit import LEAST, held_pull, limited, peak_tension, reeled_unseen, unseen_time
+from wristctl.trial.motion_limit import LEAST, borne, held_pull, limited, peak_tension, reeled_unseen, unseen_time
 from wristctl.trial.trial_results import twin
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.trial.zero_checks import _goes_on
@@ -108,11 +108,16 @@ def test_a_slower_motion_a_lower_current_or_a_lower_limit_lets_a_held_wrist_be_p
         for each in ({"motor_pull": 42.0}, {"tension": 18.0})
     )
     assert held_pull(weak, 2.5e-3) == 42.0 and held_pull(strict, 1.0e-3) == pytest.approx(38.0)
+    assert borne(strict) == 60.0, "a smaller limit is where motors stop"
+    stronger = settings.model_copy(update={"safety": settings.safety.model_copy(update={"tension": 80.0})})
+    assert borne(stronger) == 80.0
 
 
 @pytest.mark.parametrize(
     ("changes", "pull"),
-    [((), 100), (("hw-run.reference.turn=5", "hw-run.horizon=6"), None), (("hw-run.safety.motor_pull=42",), 42)],
+    [((), 100), (("hw-run.reference.turn=5", "hw-run.horizon=6"), None),
+     (("hw-run.reference.turn=5", "hw-run.horizon=6", "hw-run.safety.tension=10"), None),
+     (("hw-run.safety.motor_pull=42",), 42)],
 )  # fmt: skip
 def test_motors_that_may_pull_more_than_tendons_bear_do_not_move_real_ones_unless_told_to(
     changes: tuple[str, ...], pull: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -84,3 +84,11 @@ def held_pull(settings: HwRunSettings, reeled: float) -> float:
     """Largest pull of a tendon whose wrist is held, or whose motor fails [N]: the motor's, or the limit of tension and
     what its spool still reels in [m]."""
     return min(settings.safety.motor_pull, settings.safety.tension + settings.actuator.tendon_stiffness * reeled)
+
+
+def borne(settings: HwRunSettings) -> float:
+    """What tendons are to bear [N]: `safety.tension`, and no less than its default.
+
+    A smaller one is where motors are to stop, which they overrun by a little in any motion.
+    """
+    return max(settings.safety.tension, HwRunSettings().safety.tension)

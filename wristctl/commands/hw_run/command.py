@@ -123,7 +123,7 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     """The session with tension limited to what the trials need, as the person is told."""
     import numpy as np
 
-    from wristctl.trial.motion_limit import held_pull, limited, peak_tension, reeled_unseen
+    from wristctl.trial.motion_limit import borne, held_pull, limited, peak_tension, reeled_unseen
     from wristctl.trial.trials import trials_of
 
     study = session.study
@@ -145,15 +145,15 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         )
         return replace(session, study=changed)
     reeled = reeled_unseen(changed.hw_run, study.wrist, network)
-    pull, borne = held_pull(changed.hw_run, reeled), study.hw_run.within(study.wrist).safety.tension
-    beyond = f", beyond the {borne:.0f} N that tendons are to bear (safety.tension)" if pull > borne else ""
+    pull, most = held_pull(changed.hw_run, reeled), borne(study.hw_run)
+    beyond = f", beyond the {most:.0f} N that tendons are to bear (safety.tension)" if pull > most else ""
     said = (
         f"a wrist that is held, or a motor that fails, may pull a tendon with about {pull:.0f} N{beyond}: "
         f"spools reel in {1e3 * reeled:.1f} mm more until that is seen and they stand"
     )
     if beyond and study.hw_run.port is not None:
-        share = 100.0 * borne / study.hw_run.safety.motor_pull
-        fix = f"a slower motion, or drives at {share:.0f} % of their current (safety.motor_pull={borne:.0f})"
+        share = 100.0 * most / study.hw_run.safety.motor_pull
+        fix = f"a slower motion, or drives at {share:.0f} % of their current (safety.motor_pull={most:.0f})"
         session.operator.dare(said, "hw-run.safety.motor_pull", fix)
     else:
         session.operator.tell(said)
