@@ -24,7 +24,7 @@ def cost(bench: VirtualBench, board: Board, rate: float, commanded: bool, seen: 
         elif tick % 10 == 1:
             board.ping()
         if seen:
-            frames += bench.camera.newest() is not None
+            frames += bench.cameras[0].newest() is not None
         bench.transport.wait(max(0.0, start + tick * PERIOD - bench.transport.now()))
         bench.motion()
     return time.process_time() - began, frames
@@ -37,7 +37,7 @@ def main() -> None:
     board.enable()
     board.home()
     bench.motion()
-    bench.camera.newest()
+    bench.cameras[0].newest()
     print(f"processor seconds for {SECONDS:g} s on the bench")
     for what, rate, commanded, seen in (
         ("at rest, 20 pings a second", 0.0, False, False),
