@@ -38,4 +38,6 @@ def claims_table(claims: list[Claim]) -> str:
     """What is wanted, what was measured, and whether it holds."""
     lines = ["| wanted | measured | |\n|---|---|---|"]
     lines += [f"| {claim.wanted} | {claim.measured} | {claim.verdict} |" for claim in claims]
+    missed = [f"- {claim.wanted}: {claim.why}." for claim in claims if claim.holds is False and claim.why]
+    lines += ["\nWhat stops those that are missed:\n", *missed] if missed else []
     return "\n".join(lines) + "\n"
