@@ -118,6 +118,6 @@ def test_sound_rigs_are_drawn_alike_again_stand_and_are_of_every_kind() -> None:
 def test_the_page_of_sound_rigs_counts_those_that_were_stopped() -> None:
     sound = Ended("ok", "", math.nan, 9.0, 0.01, "", 18.0)
     text = sound_rigs.page({2: sound, 3: STOPPED})
-    assert "2 sound rigs were drawn, homed and tried once: 1 were stopped" in " ".join(text.split())
+    assert "2 sound rigs were drawn, homed and tried once; stopped: 1" in " ".join(text.split())
     rows = [row for row in text.splitlines() if row.startswith(("| 2 |", "| 3 |"))]
     assert len(rows) == 2 and rows[0].endswith("| 18 | 9 | 0.6 | ok |") and "tension of about 22 N" in rows[1]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,17 +48,6 @@ def test_serial_processes_and_an_executor_of_ones_own_give_the_same_bytes(tmp_pa
         assert [int(each["at"]) for each in done.arrays if each] == list(range(6)), "the order of the study"
     first, *others = map(contents, folders.values())
     assert len(first) == 6 and all(each == first for each in others)
-
-
-def test_units_are_handed_out_in_an_order_that_is_not_the_studys() -> None:
-    """So that those done first tell the pace of all, also where a study names what is quick first."""
-
-    def tried(units: Sequence[Unit]) -> list[str]:
-        names: list[str] = []
-        perform_units(units, Workers.of("serial"), report=lambda unit, computed: names.append(unit.name))
-        return names
-
-    assert tried(walks(8)) == tried(walks(8)[::-1]) != [unit.name for unit in walks(8)]
 
 
 def test_what_is_there_is_copied_and_not_computed_again_but_for_one_to_check(tmp_path: Path) -> None:

@@ -102,8 +102,6 @@ def perform_units(
             earlier_ones[number] = arrays
         else:
             waiting.append(number)
-    # By their keys, so in no order of the study: what is done first then tells the pace of all.
-    waiting = deque(sorted(waiting, key=lambda number: units[number].key))
     drawn = secrets.choice([*earlier_ones]) if earlier_ones else None
     expected = earlier_ones.pop(drawn) if drawn is not None else {}
     for number, arrays in earlier_ones.items():
