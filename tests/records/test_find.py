@@ -166,8 +166,9 @@ def test_a_broken_directory_is_listed_and_stops_nothing(make: Make, results: Pat
 def test_require_refuses_wrong_kind_bad_state_and_changed_files(make: Make, results: Path) -> None:
     run = make()
     assert require(run.id, "gen-data", results).path == run.path
-    with pytest.raises(UserError, match="a gen-data run where a train run is needed"):
-        require(run.id, "train", results)
+    for kind, needed in (("train", "a train run"), ("analyse", "an analyse run")):
+        with pytest.raises(UserError, match=f"a gen-data run where {needed} is needed"):
+            require(run.id, kind, results)
     (run.path / "data" / "samples.csv").write_text("x\n1\n")
     with pytest.raises(UserError, match="hash does not match"):
         require(run.id, "gen-data", results)

@@ -15,7 +15,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, Phrase, Setting, UserError
 from wristctl.records import InputRun, Run, open_run, require
-from wristctl.records.find import Content
+from wristctl.records.find import Content, a_run
 from wristctl.records.manifest import MANIFEST
 from wristctl.study_files.keys import command_of
 from wristctl.study_files.resolved import sections_read
@@ -46,7 +46,7 @@ class EarlierRun:
 NETWORK, TUNED = EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)
 IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
 """Files of an identify run with its wrist, as a study or by ratios; missing where too little was told."""
-_WRIST = Content(f"{IDENTIFIED} or {RATIOS}", "wrist")
+_WRIST = Content(IDENTIFIED, "wrist", RATIOS)
 FROM_IDENTIFIED = EarlierRun("from_identified", kind="identify", optional=True, content=_WRIST)
 
 
@@ -116,8 +116,8 @@ def opened(
 def missing_run(kind: str, need: EarlierRun, several: bool) -> UserError:
     """Error for a command that was not told an earlier run that it needs."""
     latest = Argument(need.leaf, f"latest:{need.kind}", positional=several)
-    fix = (latest, f", or the path or id of a {need.kind} run")
-    return UserError(f"{kind} needs a {need.kind} run", f"{kind}.{need.leaf}", fix)
+    fix = (latest, f", or the path or id of {a_run(need.kind)}")
+    return UserError(f"{kind} needs {a_run(need.kind)}", f"{kind}.{need.leaf}", fix)
 
 
 def named_for_good(inputs: Inputs, section: Any, out: Path) -> Any:
@@ -144,14 +144,14 @@ def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
     if isinstance(chosen, StudyResult):
         if need.kind not in (None, chosen.kind):
             fix = ("for example ", Argument(need.leaf, f"latest:{need.kind}"))
-            raise UserError(f"a {chosen.kind} result where a {need.kind} run is needed", need.leaf, fix)
+            raise UserError(f"{a_run(chosen.kind, 'result')} where {a_run(need.kind)} is needed", need.leaf, fix)
         return chosen
     ref = chosen.path if isinstance(chosen, Run) else chosen
     if not need.unfinished:
         return require(ref, need.kind, out, need.content)
     run = open_run(ref, out)
     if run.kind != need.kind:
-        raise UserError(f"a {run.kind} run where a {need.kind} run is needed", str(run.path), "name another")
+        raise UserError(f"{a_run(run.kind)} where {a_run(need.kind)} is needed", str(run.path), "name another")
     if run.state == "running":
         raise UserError("that run is still going on", str(run.path), "wait for it, or stop it first")
     return run

@@ -19,6 +19,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.unknowns import UNKNOWNS
 from wristctl.records import Run
+from wristctl.records.find import a_run
 from wristctl.records.index import dated
 from wristctl.trial.spools import on_plus_side
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
@@ -118,7 +119,7 @@ def reading_of(run: Run) -> Reading:
             if name in UNKNOWNS and metric["value"] is not None
         }
     else:
-        raise UserError(f"a {run.kind} run measures no rig", str(run.path), f"runs of {', '.join(KINDS)}")
+        raise UserError(f"{a_run(run.kind)} measures no rig", str(run.path), f"runs of {', '.join(KINDS)}")
     return Reading(run.id, _moved(run), {name: value / quantity_of(name).size for name, value in values.items()})
 
 

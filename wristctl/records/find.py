@@ -74,12 +74,23 @@ class Content(NamedTuple):
     """File of a run that other runs of its kind may lack, and what it is: for sentences."""
 
     file: str
-    """Its name, or those of several of which one will do: `a or b`."""
     what: str
+    instead: str = ""
+    """Another file that will do."""
+
+    @property
+    def named(self) -> str:
+        """Its file, or both of which one will do."""
+        return " or ".join(filter(None, (self.file, self.instead)))
 
     def of(self, run: Path) -> bool:
         """Whether the run in this folder has it."""
-        return any((run / name).is_file() for name in self.file.split(" or "))
+        return any((run / name).is_file() for name in filter(None, (self.file, self.instead)))
+
+
+def a_run(kind: str | None, what: str = "run") -> str:
+    """A run of this kind, or what else there is of it, as sentences have it: an identify run."""
+    return f"{'an' if str(kind)[0] in 'aeiou' else 'a'} {kind} {what}"
 
 
 def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content: Content | None = None) -> Run:
@@ -91,7 +102,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content:
     actual_kind = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
     if kind not in (None, actual_kind):
         raise UserError(
-            f"a {actual_kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
+            f"{a_run(actual_kind)} where {a_run(kind)} is needed", str(run.path), f"for example latest:{kind}"
         )
     again = ("run `", Call(command_of(actual_kind)), "` again")
     if run.state != "ok":
@@ -99,7 +110,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content:
         raise UserError(f"run is {run.state}, not ok{why}", str(run.path), again)
     run.check()
     if content and not content.of(run.path):
-        raise UserError(f"the run holds no {content.what} ({content.file})", str(run.path), again)
+        raise UserError(f"the run holds no {content.what} ({content.named})", str(run.path), again)
     return run
 
 
@@ -131,7 +142,7 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
         ):
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
     if latest is None and content and empty:
-        problem = f"no {kind} run that ended ok holds a {content.what} ({content.file})"
+        problem = f"no {kind} run that ended ok holds a {content.what} ({content.named})"
         raise UserError(problem, f"{ref} in {results}", ("run `", Call(command_of(kind)), "` again"))
     if latest is None:
         if asked:

@@ -16,6 +16,7 @@ from wristctl.errors import FILE, UserError, meant, writing
 from wristctl.escape import printable
 from wristctl.records import Run, require
 from wristctl.records.files import write_text
+from wristctl.records.find import a_run
 from wristctl.records.lineage import input_run
 from wristctl.study_files.load import load_study
 from wristctl.study_files.shipped import study_file
@@ -142,7 +143,7 @@ def _of_run(run: Run, controller: str | None, overrides: Sequence[str]) -> tuple
         return load_study(list(kept.values())), about
     if not kept:
         raise UserError(
-            f"a {run.kind} run has no tuned controller", str(run.path), "a run of tune, recommend or hw-run"
+            f"{a_run(run.kind)} has no tuned controller", str(run.path), "a run of tune, recommend or hw-run"
         )
     names = f"one of {', '.join(kept)}: `wristctl export-law {run.id} {next(iter(kept))}`"
     if controller is None:

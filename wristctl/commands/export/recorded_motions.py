@@ -18,6 +18,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
 from wristctl.records import Run
+from wristctl.records.find import a_run
 from wristctl.records.log_columns import units_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -79,7 +80,7 @@ def motions_of(run: Run) -> list[RecordedMotion]:
         for name, read in _READERS.items():
             if run.has(f"data/{name}") and (motions := read(run)):
                 return motions
-    problem = f"a {run.kind} run holds no motion over time"
+    problem = f"{a_run(run.kind)} holds no motion over time"
     kinds = "name a simulate, compare, track or hw-run run"
     modes = "analyse --of hysteresis or gen-data --source transitions"
     raise UserError(problem, str(run.path), f"{kinds}, or one of {modes}")
