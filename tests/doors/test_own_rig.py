@@ -147,9 +147,10 @@ def test_a_broken_rig_is_named_by_its_check(tmp_path: Path, wrong: str) -> None:
 class _Tried:
     """A trial of a rig in memory."""
 
-    def __init__(self, folder: Path, *changes: tuple[str, str], horizon: float = 1.0) -> None:
-        reference = written(folder, *changes)
-        settings = HwRunSettings(rig=reference, rows=(RigRow(controller="pid-ff"),), horizon=horizon)
+    def __init__(self, folder: Path, *changes: tuple[str, str], horizon: float = 1.0, **given: Any) -> None:
+        settings = HwRunSettings.model_validate(
+            {"rig": written(folder, *changes), "rows": (RigRow(controller="pid-ff"),), "horizon": horizon} | given
+        )
         study = adopted(Study(hw_run=settings), "hw-run").study
         self.settings, self.wrist = study.hw_run, study.wrist
         namespace: dict[str, Any] = {}
@@ -184,6 +185,24 @@ def test_a_trial_follows_its_motion_and_homing_finds_the_slack(
     errors = log[[name for name in log.columns if name.startswith("error")]]
     assert len(log) == 100 and np.rad2deg(errors.abs().max().max()) < 0.5
     assert (pd.read_csv(tried.folder / "residuals.csv")["late"] == 0.0).all()  # virtual time
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [(), ONE_PLANE], ids=["three tendons, two planes", "two tendons, one plane"])
+def test_trials_of_it_wind_by_the_stretch_that_homing_measures_where_that_is_wanted(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...]
+) -> None:
+    """Its tendons are 1.6 times as stiff as its facts say: without feedback the wrist goes too far for them."""
+    softer, missed = ("stiffness=TENDON", "stiffness=TENDON / 1.6"), dict[str, float]()
+    for stretch in ("believed", "measured"):
+        (folder := tmp_path / stretch).mkdir()
+        rows = (RigRow(controller="feedforward", gains={}),)
+        tried = _Tried(folder, *changes, softer, rows=rows, homing={"stretch": stretch})
+        assert tried.run().outcomes == {0: "ok"}
+        log = pd.read_csv(folder / "data" / "log.csv")
+        errors = log[[name for name in log.columns if name.startswith("error")]].to_numpy()
+        missed[stretch] = float(np.rad2deg(np.sqrt((errors**2).sum(axis=1).mean())))
+    assert missed["measured"] < 0.5 * missed["believed"], missed
 
 
 # The same rig with force sensors, whose scale is wrong by a factor.

@@ -118,8 +118,7 @@ class BoardStand:
         expected = ExpectedMoves(settings, self._wrist, plane, self._layout)
         steps = self.zero.steps_per_radian
         stiffness, oblique = expected.tendon_stiffness(steps), 0.0 if pose is None else pose.oblique
-        wound_by = expected.measured_stiffness(steps) if settings.homing.stretch == "measured" else None
-        return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness, wound_by)
+        return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness, expected.wound_by(steps))
 
     @property
     def _signs(self) -> tuple[int, ...]:

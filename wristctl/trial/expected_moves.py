@@ -179,6 +179,10 @@ class ExpectedMoves:
         rigid, believed = self.steps(math.inf), self._spools.stiffness
         return stiffness_by_length(believed, believed * (self.steps() - rigid), float(np.mean(steps)) - rigid)
 
+    def wound_by(self, steps: Sequence[float]) -> float | None:
+        """`measured_stiffness` where spools are to wind by it; None where by what is believed."""
+        return self.measured_stiffness(steps) if self._homing.stretch == "measured" else None
+
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist against a reading of the straight wrist."""
         theta = reading.theta - straight.theta

@@ -97,10 +97,8 @@ class RigStand:
             self._drive = RigDrive(self._rig, self._settings, self._rig.connect())
             self._tracking = RigTracking(self._rig)
             self.zero = self.home()
-        wound_by = None
-        if self._settings.homing.stretch == "measured":
-            expected = ExpectedMoves(self._settings, self._wrist, self._plane, self._layout)
-            wound_by = expected.measured_stiffness(self.zero.steps_per_radian)
+        expected = ExpectedMoves(self._settings, self._wrist, self._plane, self._layout)
+        wound_by = expected.wound_by(self.zero.steps_per_radian)
         return AtZero(self._drive, self._tracking, self._plane, wound_by=wound_by)
 
     def home(self) -> Zero:

@@ -225,9 +225,9 @@ class Watch:
 
     def _before(self, camera: int) -> Frame:
         """The frame of a camera before its newest one; without one before it that one itself."""
-        frames = [past.frames[camera] for past in self._past]
-        earlier = [frame for frame in frames if frame.captured < frames[-1].captured]
-        return (earlier[-1:] or frames[-1:])[0]
+        frames = (past.frames[camera] for past in reversed(self._past))
+        newest = next(frames)
+        return next((frame for frame in frames if frame.captured < newest.captured), newest)
 
     def _of_timing(self, clock: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))

@@ -106,8 +106,8 @@ class Recommended(StudyResult):
     @property
     def excess(self) -> dict[int, float]:
         """Of those of `near` that are sound in their rehearsal, in order, by how much they err more than the least."""
-        sound = {row: self.rehearsals[row] for row in self.near if row not in self.untried}
-        sound = {row: rehearsal for row, rehearsal in sound.items() if not rehearsal.fault}
+        tried = {row: self.rehearsals[row] for row in self.near if row in self.rehearsals}
+        sound = {row: rehearsal for row, rehearsal in tried.items() if not rehearsal.fault}
         return {row: rehearsal.excess([*sound.values()]) for row, rehearsal in sound.items()}
 
     @property

@@ -36,10 +36,9 @@ def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str,
 
 def homes(study: Study) -> bool:
     """Whether trials of what is recommended wind by the tendons' stretch that homing measures: those of the board."""
-    if own_rig(study) is not None or trial_of(study) != "hw-run":
-        return False
-    given = "stretch" in study.hw_run.homing.model_fields_set and study.hw_run.homing.stretch == "believed"
-    return not given
+    homing = study.hw_run.homing
+    says_believed = "stretch" in homing.model_fields_set and homing.stretch == "believed"
+    return own_rig(study) is None and trial_of(study) == "hw-run" and not says_believed
 
 
 def _homing(study: Study) -> dict[str, Any]:
