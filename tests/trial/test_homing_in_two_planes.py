@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.trial.conftest import WRIST
 from tests.trial.in_two_planes import bench_of, circling
@@ -26,8 +28,8 @@ QUICK = {"move": 1e-4, "rest": 0.15, "frames": 5, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(seed: int = 0, wrist: WristParameters = WRIST, **motors: Any) -> Zero:
-    settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
+def homed(seed: int = 0, wrist: WristParameters = WRIST, plant: dict[str, Any] | None = None, **motors: Any) -> Zero:
+    settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}, "plant": plant or {}})
     bench, layout = bench_of(settings, seed, wrist), layout_of_rig(settings, wrist)
     tracking = EmulatedTestbed(bench, settings, [View(), View()], None).tracking()
     board = Board(bench.transport)
@@ -67,6 +69,14 @@ def test_three_tendons_at_drawn_places_are_found_there_and_exchanged_ones_named(
 
 
 @pytest.mark.slow
+def test_tendons_of_a_soft_wrist_that_rests_off_straight_by_its_own_friction_are_found_where_they_are() -> None:
+    """Its springs hold the hand up by little more than its weight: friction keeps it bent as far as homing bends it."""
+    wrist = WristParameters(length=0.11, hand_mass=0.19, stiffness=0.3)
+    off = np.array(homed(27, wrist, {"inner_friction": 0.0136}).directions) - pull_directions()
+    assert np.degrees(np.abs(np.angle(np.exp(1j * off)))).max() < 12.0
+
+
+@pytest.mark.slow
 def test_exchanged_motors_are_named_by_direction_alone() -> None:
     with pytest.raises(SafetyStop) as stopped:
         homed(order=(1, 0, 2, 3))
@@ -100,6 +110,29 @@ def test_a_bend_is_an_axis_own_within_the_stated_angle_and_another_tendons_beyon
         ) as stopped:
             MOVES.judge_side(axis, bend(math.degrees(pull_directions()[other])))
         assert ("turns the wrong way" in stopped.value.what) == (other == 3 - axis)
+
+
+@given(
+    axis=st.integers(0, 3), rests=st.floats(0.0, 2.0), toward=st.floats(0.0, 360.0), share=st.floats(-0.98, 0.98),
+    count=st.integers(3, 9),
+)  # fmt: skip
+def test_a_line_goes_where_bends_grow_wherever_the_wrist_rested_before(
+    axis: int, rests: float, toward: float, share: float, count: int
+) -> None:
+    """So that friction which keeps a wrist bent is not taken for a tendon in another hole, nor hides one that is."""
+    reeled, place = [10 + 4 * move for move in range(count)], math.degrees(pull_directions()[axis])
+    rest, limit = bend(toward, math.radians(rests)), circling().homing.direction_deg
+    off = share * limit
+
+    def line(angle: float) -> float:
+        bends = [bend(angle, 0.002 * steps) for steps in reeled]
+        bends = [Bend(rest.theta + each.theta, rest.away + each.away) for each in bends]
+        return MOVES.judge_line(axis, bends[-1].since(rest), reeled, bends)
+
+    found = line(place + off)
+    assert math.cos(found - math.radians(place + off)) == pytest.approx(1.0, abs=1e-9)
+    with pytest.raises(SafetyStop, match=rf"tendon {ACTIVE[axis]} is at"):
+        line(place + math.copysign(limit + 1.0, off))
 
 
 def test_oblique_springs_turn_where_a_tendon_bends_the_wrist() -> None:

@@ -274,15 +274,15 @@ class ExpectedMoves:
     def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
         """Direction [rad] in which bends grow with what an axis has reeled in, nan before one camera.
 
-        Raises SafetyStop where it is another tendon's; `moved` is the last bend against where the wrist rested before.
+        They may begin far off straight, where friction of its own keeps a wrist bent. Raises SafetyStop where the
+        direction is another tendon's; `moved` is the last bend against where the wrist rested before.
         """
         if self._planes == 1:
             self.judge_side(axis, moved)
             return math.nan
-        slope, offset = np.polyfit(reeled, [self.along(axis, bent) for bent in bends], 1)
-        grown = Bend(*((slope * np.array(reeled) + offset) @ np.array(bends)).tolist())
-        self.judge_side(axis, grown)
-        return math.atan2(grown.away, grown.theta)
+        (theta, away), _ = np.polyfit(reeled, np.array(bends), 1)
+        self.judge_side(axis, Bend(theta, away))
+        return math.atan2(away, theta)
 
     def _stretch(self, stays: float) -> float:
         """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
