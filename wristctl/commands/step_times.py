@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wristctl.control.law import Controller
 
 # Seconds in which a controller's step is timed, and in which rankings are drawn.
-_TIMED, _DRAWN = 0.08, 2.2
+_TIMED, _DRAWN = 0.065, 1.9
 
 
 def after_rollouts(controllers: int) -> float:
