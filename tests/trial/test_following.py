@@ -217,6 +217,37 @@ def test_softer_tendons_bend_the_wrist_less_and_the_two_models_say_how_much() ->
     assert same[0] == same[1], "tendons are never taken for stiffer than believed"
 
 
+def test_what_a_declared_load_stretches_lies_between_the_models_as_what_nothing_loads() -> None:
+    """A wrist that stands upright leans further with a load, most on soft tendons; one that hangs less far."""
+    hanging = WRIST.model_copy(update={"gravity": (9.81, 0.0)})
+    for wrist, further in ((WRIST, 1.0), (hanging, -1.0)):
+        loaded = wrist.model_copy(update={"hand_mass": wrist.hand_mass + 0.5})
+        one, two, both = (
+            BlindModel(each, SETTINGS.actuator, 5e3, PERIOD, ("ulnar",), payload=payload)
+            for each, payload in ((wrist, 0.0), (loaded, 0.0), (wrist, 0.5))
+        )
+        for model in (one, two, both):
+            for _ in range(400):
+                model.predict(np.array([8e-3, -8e-3]))
+        alone, carrying, angles = (model.angles(399 * PERIOD)[:, 0] for model in (one, two, both))
+        assert angles == pytest.approx([*alone, *carrying])
+        assert (further * (carrying - alone) > math.radians(0.5)).all()
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_a_wrist_that_leans_under_its_declared_load_is_not_off_its_motors(declared: bool) -> None:
+    watch = Watch(settings_of(payload=0.5 if declared else 0.0), WRIST, "ulnar", TickTiming(PERIOD))
+    loaded = BlindModel(WRIST, SETTINGS.actuator, LIMITS.softest, PERIOD, ("ulnar",), payload=0.5)
+    for _ in range(400):
+        for model in (watch, loaded):
+            model.predict(np.array([8e-3, -8e-3]))
+    now = 399 * PERIOD
+    angle = float(loaded.angles(now).max())
+    seen = Sighting(now, 0, angle, SightingVerdict.OK, np.zeros((2, 4, 2)), 0.9, stands=1.0, grey=1.0)
+    apart = watch.saw(seen, now, now).apart
+    assert apart == 0.0 if declared else apart > math.radians(0.5)
+
+
 def test_between_two_ticks_the_model_is_between_its_angles() -> None:
     model = BlindModel(WRIST, SETTINGS.actuator, 5e3, PERIOD, ("ulnar",))
     for _ in range(20):

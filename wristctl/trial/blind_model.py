@@ -23,23 +23,26 @@ _STILL = 2.5e-3
 
 
 class BlindModel:
-    """Two one-segment wrists at rest at zero: with tendons as believed, and with the softest that there may be.
+    """One-segment wrists at rest at zero: with tendons as believed, with the softest that there may be, and the same
+    with the `payload` [kg] that the hand may take up, where there is any.
 
-    Tendons that are softer than believed bend a wrist less; what is true lies between the two. Ticks are numbered from
-    0, `period` [s] apart.
+    Tendons that are softer than believed bend a wrist less, and a load stretches them; what is true lies between all of
+    these. Ticks are numbered from 0, `period` [s] apart.
     """
 
     def __init__(
         self, wrist: WristParameters, actuator: Actuator, softest: float, period: float, planes: Sequence[str],
-        layout: TendonLayout | None = None,
+        layout: TendonLayout | None = None, payload: float = 0.0,
     ) -> None:  # fmt: skip
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
+        loaded = wrist.model_copy(update={"hand_mass": wrist.hand_mass + payload})
         self._wrists = [
-            (RigBelief(wrist, tendons, planes, layout).known, np.zeros(OF_A_PLANE * len(planes)))
+            (RigBelief(each, tendons, planes, layout).known, np.zeros(OF_A_PLANE * len(planes)))
+            for each in (wrist, loaded)[: 2 if payload > 0.0 else 1]
             for tendons in (actuator, soft)
         ]
         self._period, self._tick = period, 0
-        self._angles = np.zeros((_REMEMBERED, 2, len(planes)))
+        self._angles = np.zeros((_REMEMBERED, len(self._wrists), len(planes)))
         self._parts = max(1, math.ceil(period / _STILL - 1e-9))
         self._reeled: Array | float = 0.0
 
@@ -54,7 +57,8 @@ class BlindModel:
             self._angles[self._tick % _REMEMBERED, k] = x[::OF_A_PLANE]
 
     def angles(self, time: float) -> Array:
-        """Bends (2, P) [rad] of both wrists `time` seconds after tick 0, as far as they are remembered."""
+        """Bends (W, P) [rad] of the wrists `time` seconds after tick 0, as far as they are remembered; that of believed
+        tendons and no load is the first."""
         tick = min(max(math.floor(time / self._period), self._tick - _REMEMBERED + 1), self._tick)
         share = min(max(time / self._period - tick, 0.0), 1.0)
         before, after = self._angles[tick % _REMEMBERED], self._angles[min(tick + 1, self._tick) % _REMEMBERED]

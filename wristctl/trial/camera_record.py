@@ -34,13 +34,13 @@ class Frame(NamedTuple):
     captured: float
     seen: float
     predicted: Array
-    """Angles with tendons as believed and as soft as may be, (2,)."""
+    """Angles with tendons as believed and as soft as may be, without a declared load and with it, (2,) or (4,)."""
     away: float
     """Bend away from the camera, by the size of the tip's marker; nan where a picture does not tell."""
 
     @property
     def apart(self) -> float:
-        """Angle off what lies between both predictions [rad]."""
+        """Angle off what lies between all predictions [rad]."""
         return self.seen - float(np.clip(self.seen, self.predicted.min(), self.predicted.max()))
 
 
@@ -145,7 +145,8 @@ class CameraRecord:
         self.moved = float(np.hypot(*(base - self._base).mean(axis=0))) / side if side > 0.0 else 0.0
 
     def saw(self, sighting: Sighting, captured: float, predicted: Array, rate: float, clock: float) -> Frame:
-        """Take in a usable frame, taken `captured` seconds after tick 0, where the model has (2,) and this rate."""
+        """Take in a usable frame, taken `captured` seconds after tick 0, where the models are at `predicted`, with the
+        believed one's rate."""
         self.frame = Frame(sighting.time, sighting.theta, predicted, self._across(sighting, clock))
         self._usable.add(clock)
         self.lag.add(sighting.theta, float(predicted[0]), rate)

@@ -307,7 +307,7 @@ class TrialLog:
 
     def frame(self, trial: int, used: float, begin: float, sighting: Sighting, frame: Frame | None) -> None:
         """One frame of a trial that began at `begin`, there at `used` on its time; `frame` where its angle counts."""
-        predicted = (math.nan, math.nan) if frame is None else frame.predicted.tolist()
+        predicted = (math.nan, math.nan) if frame is None else frame.predicted[:2].tolist()
         seen = sighting.theta, sighting.verdict, sighting.tip_x, sighting.tip_y, sighting.size
         plane = (PLANES[sighting.plane],) if self._planes == 2 else ()
         place = trial, *plane, sighting.number, sighting.time - begin, used

@@ -89,7 +89,8 @@ class Watch:
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
         softest = settings.safety.softest
-        self._blind = BlindModel(wrist, settings.actuator, softest, self._period, planes, layout)
+        payload = settings.payload
+        self._blind = BlindModel(wrist, settings.actuator, softest, self._period, planes, layout, payload)
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
