@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -138,6 +139,33 @@ def test_motors_that_may_pull_more_than_tendons_bear_do_not_move_real_ones_unles
         else:
             assert not begun and stopped.value.exit_code == 3 and "60 % of their current" in str(stopped.value.fix)
             assert "may pull a tendon with about 100 N, beyond the 60 N" in stopped.value.what
+
+
+@pytest.mark.parametrize(
+    ("changes", "refused"),
+    [((), True), (("hw-run.safety.motor_pull=60",), False), (("hw-run.reference.angle_deg=12",), False)],
+)
+def test_a_motion_that_needs_more_than_motors_are_asked_for_moves_real_ones_only_where_it_is_forced(
+    changes: tuple[str, ...], refused: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wrist of 3.2 N m/rad needs some 38 N for 20 deg; of motors that pull 42 N four fifths are asked."""
+    begun: list[str] = []
+    monkeypatch.setattr("wristctl.commands.hw_run.trials.perform_trials", lambda *given: _begin(begun))
+    stiff = "hw-run={reference: {angle_deg: 20}, push: {force: 0}, directions: [extension], horizon: 2.0}"
+    for port in ("null", "/nowhere"):
+        study = wristctl.load_study(None, "wrist.stiffness=3.2", stiff, f"hw-run.port={port}", *changes)
+        for flags in ({"yes"}, {"yes", "force"}):
+            operator = TerminalOperator(Terminal(stderr=True), True, frozenset(flags))
+            with pytest.raises(UserError) as stopped:
+                hw_run(Session(study, Inputs(), Findings(study.seed, None), watched(None), operator))
+            said = " ".join(capsys.readouterr().err.split())
+            if refused and port != "null" and "force" not in flags:
+                assert not begun and stopped.value.exit_code == 3
+                assert re.search(
+                    r"trials need \d+ N, and of motors that pull 42 N no more than 34 N", stopped.value.what
+                )
+            else:
+                assert begun.pop() == "begun" and ("motors slip" in said) == refused
 
 
 def _begin(begun: list[str]) -> None:

@@ -23,6 +23,7 @@ from wristctl.trial.control_loop import AtZero, ControlLoop, Shown, course_of
 from wristctl.trial.homing import Zero
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
+from wristctl.trial.motion_limit import asked_at_most
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes, numbers_of
@@ -43,9 +44,6 @@ from wristctl.wrist.plant import plant_in
 log = logging.getLogger(__name__)
 
 Stand = BoardStand | RigStand
-
-# Share of the motors' pull that a law may ask for: they turn meanwhile, and the wrist may be pushed.
-_ASKED = 0.8
 
 
 class Stop:
@@ -235,7 +233,7 @@ class Experiment:
 
 def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
     """The wrist with tensions that its motors can hold. Raises UserError where these are not above pretension."""
-    limit = min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
+    limit = asked_at_most(settings, wrist)
     if limit <= wrist.pretension:
         problem = f"motors of {settings.safety.motor_pull:g} N cannot hold a pretension of {wrist.pretension:g} N"
         raise UserError(problem, "safety.motor_pull", "more current (documentation: The rig), or less wrist.pretension")

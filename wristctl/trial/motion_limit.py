@@ -23,6 +23,8 @@ from wristctl.wrist.kinematics import Inverse
 
 # A limit is no less [N]: tendons whose zero is 0.3 mm off pull so much more than simulated ones.
 LEAST = 12.0
+# Share of the motors' pull that a controller may ask for: they turn meanwhile, and the wrist may be pushed.
+_ASKED = 0.8
 
 
 def peak_tension(
@@ -52,6 +54,14 @@ def limited(study: Study, peak: float) -> Study:
     most = min(settings.within(study.wrist).safety.tension, max(LEAST, settings.tension_factor * peak))
     safety = settings.safety.model_copy(update={"tension": most})
     return study.model_copy(update={"hw_run": settings.model_copy(update={"safety": safety})})
+
+
+def asked_at_most(settings: HwRunSettings, wrist: WristParameters) -> float:
+    """Largest tension of a tendon [N] that a controller may ask for: a share of a motor's pull, and what a wrist bears.
+
+    A motion that needs more leaves the wrist behind, or motors slip.
+    """
+    return min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
 
 
 def unseen_time(settings: HwRunSettings) -> float:

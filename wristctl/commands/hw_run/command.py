@@ -123,7 +123,7 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     """The session with tension limited to what the trials need, as the person is told."""
     import numpy as np
 
-    from wristctl.trial.motion_limit import borne, held_pull, limited, peak_tension, reeled_unseen
+    from wristctl.trial.motion_limit import asked_at_most, borne, held_pull, limited, peak_tension, reeled_unseen
     from wristctl.trial.trials import trials_of
 
     study = session.study
@@ -144,6 +144,15 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
             "reference needs"
         )
         return replace(session, study=changed)
+    asked, motors = asked_at_most(study.hw_run, study.wrist), study.hw_run.safety.motor_pull
+    if math.isfinite(peak) and peak > asked:
+        share = 100.0 * peak / asked
+        _dare(
+            session,
+            f"in simulation the trials need {peak:.2g} N, and of motors that pull {motors:.3g} N no more than "
+            f"{asked:.2g} N is asked: the wrist stays behind, or motors slip",
+            f"a smaller motion, or drives at {share:.0f} % of their current (safety.motor_pull)",
+        )
     reeled = reeled_unseen(changed.hw_run, study.wrist, network)
     pull, most = held_pull(changed.hw_run, reeled), borne(study.hw_run)
     beyond = f", beyond the {most:.0f} N that tendons are to bear (safety.tension)" if pull > most else ""
@@ -151,13 +160,21 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         f"a wrist that is held, or a motor that fails, may pull a tendon with about {pull:.0f} N{beyond}: "
         f"spools reel in {1e3 * reeled:.1f} mm more until that is seen and they stand"
     )
-    if beyond and study.hw_run.port is not None:
-        share = 100.0 * most / study.hw_run.safety.motor_pull
+    if beyond:
+        share = 100.0 * most / motors
         fix = f"a slower motion, or drives at {share:.0f} % of their current (safety.motor_pull={most:.0f})"
-        session.operator.dare(said, "hw-run.safety.motor_pull", fix)
+        _dare(session, said, fix)
     else:
         session.operator.tell(said)
     return replace(session, study=changed)
+
+
+def _dare(session: Session, danger: str, fix: str) -> None:
+    """Tell what motors may do; of real ones only an operator that forces it goes on."""
+    if session.study.hw_run.port is None:
+        session.operator.tell(danger)
+    else:
+        session.operator.dare(danger, "hw-run.safety.motor_pull", fix)
 
 
 def _in_one_plane(study: Study) -> bool:
