@@ -470,3 +470,16 @@ def test_a_wrist_that_stays_bent_may_begin_with_a_tendon_that_much_tighter() -> 
     for slack, stood in ((-homing.taut - 0.5 * stretch, 0.0), (-homing.taut - 1.1 * stretch, stays)):
         with pytest.raises(SafetyStop, match="was taut by"):
             expected.judge_slack(1, slack, stood)
+
+
+def test_friction_inside_is_named_of_a_wrist_that_stays_bent_and_of_no_other() -> None:
+    expected, rubs = (
+        ExpectedMoves(settings_of(), WRIST, "ulnar"),
+        "friction inside the wrist, which stays bent by 1.9 deg",
+    )
+    for stays, named in ((math.radians(1.9), True), (math.radians(0.1), False)):
+        with pytest.raises(SafetyStop, match=r"times what the model says .* or microsteps") as steps:
+            expected.judge_steps(2, 1.95 * expected.steps(), stays)
+        with pytest.raises(SafetyStop, match="tendon 2 was taut by") as slack:
+            expected.judge_slack(1, -2e-3, stays)
+        assert all((rubs in stop.value.what) == named for stop in (steps, slack))

@@ -60,17 +60,14 @@ def middle(bends: Sequence[Bend]) -> Bend:
 class _Alone(NamedTuple):
     """One tendon alone, of each axis: where it bends the wrist, and what its spool reels in for a radian.
 
-    The spool reels in path + torque/(lever k_t), of a tendon of the stiffness k_t.
+    The spool reels in path + torque/(lever k_t), (T,) [m/rad], of a tendon of the stiffness k_t.
     """
 
     toward: Array
     """(T, 2), as a Bend has it: a unit vector, or before one camera 1 and -1 for the sides in the plane and across."""
     path: Array
-    """(T,) [m/rad]"""
     torque: Array
-    """(T,)"""
     lever: Array
-    """(T,)"""
 
 
 def _before_one_camera(wrist: WristParameters, plane: str, away: Sequence[int], torque: float, ratio: float) -> _Alone:
@@ -288,13 +285,19 @@ class ExpectedMoves:
         """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
         return self._stiffness * stays / (self.lever * self._softest)
 
+    def _rubs(self, stays: float) -> str:
+        """Friction of a wrist's own as a cause, before others; empty of one that stays bent by so little [rad]."""
+        if stays <= _RUBS * math.radians(self._homing.bend_deg):
+            return ""
+        return f"friction inside the wrist, which stays bent by {math.degrees(stays):.1f} deg when nothing pulls, or "
+
     def has_steps(self, axis: int, steps: float, stays: float = 0.0) -> bool:
         """Whether steps per radian are those of the model, within `homing.steps_tolerance`.
 
         The tolerance is doubled where the wrist stays bent by `stays` [rad] when nothing pulls. Its own friction then
         carries a part of the torque of a small bend, and may keep it from bending across the plane.
         """
-        rubs = stays > _RUBS * math.radians(self._homing.bend_deg)
+        rubs = bool(self._rubs(stays))
         share, harder = (2.0 if rubs else 1.0) * self._homing.steps_tolerance, _RUBBING if rubs else _HARDER
         most = (1.0 + share) * self.steps(self._softest, harder, axis)
         return (1.0 - share) * self.steps(axis=axis) <= steps <= most
@@ -302,21 +305,21 @@ class ExpectedMoves:
     def judge_steps(self, axis: int, steps: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where steps per radian are not those of the model, as `has_steps`."""
         if not self.has_steps(axis, steps, stays):
-            raise self._wrong_steps(axis, steps, self.steps(axis=axis))
+            raise self._wrong_steps(axis, steps, self.steps(axis=axis), stays)
 
     def judge_growth(self, axis: int, steps: float, stiffness: float) -> None:
         """Raises SafetyStop where a bend grows by steps nearer to half or twice the model's of this stiffness [N/m]."""
         if not 0.5 < (steps / (meant := self.steps(stiffness, axis=axis))) ** 2 < 2.0:
             raise self._wrong_steps(axis, steps, meant)
 
-    def _wrong_steps(self, axis: int, steps: float, meant: float) -> SafetyStop:
+    def _wrong_steps(self, axis: int, steps: float, meant: float, stays: float = 0.0) -> SafetyStop:
         ratio, unit = steps / meant, self._spools.step
         taken = f"{1e3 * steps * unit:.3g} mm of tendon" if self.own else f"{steps:.0f} steps"
         model = f"{1e3 * meant * unit:.3g} mm" if self.own else f"{meant:.0f}"
         words, slips = self._words, "a slipping tendon, or others that were taut"
         problem = (
             f"{words.motors[axis]} takes {taken} for one radian, {ratio:.2f} times what the model says ({model}); "
-            f"likely {words.scale}, or {slips if ratio > 1.0 else words.loose}"
+            f"likely {self._rubs(stays)}{words.scale}, or {slips if ratio > 1.0 else words.loose}"
         )
         return SafetyStop(problem, "homing", words.rescale)
 
@@ -328,7 +331,8 @@ class ExpectedMoves:
         """
         if slack >= -self._homing.taut - self._stretch(stays):
             return
-        problem = f"tendon {self._numbers[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
+        likely = f"; likely {rubs}it was not let out" if (rubs := self._rubs(stays)) else ""
+        problem = f"tendon {self._numbers[axis]} was taut by {-1e3 * slack:.2f} mm when homing began{likely}"
         raise SafetyStop(problem, "homing", self._words.taut)
 
     def judge_friction(self, axis: int, friction: float, stays: float) -> None:
