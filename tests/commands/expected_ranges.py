@@ -10,7 +10,6 @@ goes on there. Writes docs/expected-range.md.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Collection, Mapping, Sequence
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from tests.commands.recommended_rigs import SPRINGS, drawn
-from tests.drawn_rigs import options, tried
+from tests.drawn_rigs import ended, options, tried
 from wristctl.commands.inputs_of_loops import why_two_planes
 from wristctl.commands.recommend.command import SCALED
 from wristctl.commands.recommend.expected import Candidate, asked_for, rigs_asked, spread
@@ -195,14 +194,10 @@ def main() -> int:
             print(*tried(one, emulated, "emulated"), flush=True)
         if asked.facts:
             print(*tried(one, left_of, "facts"), flush=True)
-    rows, truths, facts = ({n: json.loads(_kept(asked.kept / part, n).read_text()) for n in WRISTS
-                     if _kept(asked.kept / part, n).is_file()} for part in ("", "emulated", "facts"))  # fmt: skip
+    every = (ended(asked, *part) for part in ((), ("emulated",), ("facts",)))
+    rows, truths, facts = ({number: came[number] for number in WRISTS if number in came} for came in every)
     PAGE.write_text(page(rows, truths, facts))
     return 0
-
-
-def _kept(folder: Path, number: int) -> Path:
-    return folder / f"{number}.json"
 
 
 if __name__ == "__main__":

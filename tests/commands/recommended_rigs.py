@@ -8,15 +8,13 @@ call goes on there. `--page` writes the page of what was tried. Writes docs/hard
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
-from operator import itemgetter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +23,7 @@ import pandas as pd
 
 import wristctl
 from tests.commands.conftest import session
-from tests.drawn_rigs import options, tried
+from tests.drawn_rigs import COMMITTED, ended, options, tried
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.answer import RECOMMENDED, Recommended
 from wristctl.commands.recommend.command import plan, recommend
@@ -216,16 +214,12 @@ def page(rows: Sequence[tuple[int, dict[str, Any]]]) -> str:
 
 def main() -> int:
     """Try wrists, a line each, and write the page; 1 where they do not keep what is promised."""
-    parser = options(__doc__, WRISTS, "recommended-rigs")
+    parser = options(__doc__, WRISTS, "recommended-rigs", COMMITTED)
     parser.add_argument("--page", action="store_true", help="only write the page, of what was tried")
-    asked, rows = parser.parse_args(), list[tuple[int, dict[str, Any]]]()
-    ended: Iterable[tuple[int, dict[str, Any]]] = tried(asked, tried_out)
-    if asked.page:
-        ended = ((int(file.stem), json.loads(file.read_text())) for file in asked.kept.glob("*.json"))
-    for number, found in ended:
-        rows.append((number, found))
+    asked = parser.parse_args()
+    for number, found in () if asked.page else tried(asked, tried_out):
         print(number, found, flush=True)
-    rows.sort(key=itemgetter(0))
+    rows = [*ended(asked).items()]
     text = page(rows)
     print(text)
     PAGE.write_text(text)

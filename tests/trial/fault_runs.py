@@ -67,20 +67,24 @@ def _at_zero() -> WristCalibration:
 
 def as_limited(settings: HwRunSettings, wrist: WristParameters = WRIST) -> HwRunSettings:
     """The settings with tension limited to what their trials need, as `hw-run` limits it."""
-    study = wristctl.load_study(None).model_copy(update={"hw_run": settings, "wrist": wrist})
-    alike = settings.model_copy(update={"bench": HwRunSettings().bench, "port": None}).model_dump_json()
-    return limited(study, _needed(alike, wrist.model_dump_json(), study)).hw_run
+    return limited(_study_of(settings, wrist), needed(settings, wrist)).hw_run
 
 
 _NEEDED: dict[tuple[str, str], float] = {}
 
 
-def _needed(settings: str, wrist: str, study: Study) -> float:
-    """What trials need by the belief, which the emulated bench does not change."""
-    if (settings, wrist) not in _NEEDED:
-        trials = trials_of(study.hw_run, np.random.default_rng(0))
-        _NEEDED[settings, wrist] = peak_tension(study, trials, None, None)
-    return _NEEDED[settings, wrist]
+def needed(settings: HwRunSettings, wrist: WristParameters) -> float:
+    """Tension [N] that trials need by the belief, which the emulated bench does not change."""
+    alike = settings.model_copy(update={"bench": HwRunSettings().bench, "port": None}).model_dump_json()
+    key = alike, wrist.model_dump_json()
+    if key not in _NEEDED:
+        trials = trials_of(settings, np.random.default_rng(0))
+        _NEEDED[key] = peak_tension(_study_of(settings, wrist), trials, None, None)
+    return _NEEDED[key]
+
+
+def _study_of(settings: HwRunSettings, wrist: WristParameters) -> Study:
+    return wristctl.load_study(None).model_copy(update={"hw_run": settings, "wrist": wrist})
 
 
 class _Watched(BoardStand):

@@ -16,13 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tests.drawn_rigs import options, tried
+from tests.drawn_rigs import COMMITTED, ended, options, tried
 from tests.trial.conftest import WRIST
-from tests.trial.fault_runs import camera_before, injecting, over, rig_settings
+from tests.trial.fault_runs import camera_before, injecting, needed, over, rig_settings
 from tests.trial.largest_pulls import folded
 from tests.trial.single_trials import Ended, performed
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
+from wristctl.trial.motion_limit import asked_at_most
 from wristctl.trial.resting import sag_of
 from wristctl.tuning.scaled_presets import scaled_to
 
@@ -32,6 +34,12 @@ PAGE = Path(__file__).parents[2] / "docs" / "hardware" / "sound-rigs.md"
 LAWS = "smc-tracking", "ct-dob", "pid-ff", "pid-dob", "adrc", "lqi", "mpc", "impedance", "mrac"
 TAKEN = 0.3
 """When the hand takes up its load: seconds after the motion began."""
+_IN_HAND = 1.2
+"""By how much springs are stiffer than what holds the hand up."""
+REFUSED, SLIPPED = "refused", "a motor slipped"
+"""How ends begin of rigs that are not to be tried, and that motors cannot move."""
+RUBS_DEG = 5.0
+"""Bend at which friction inside a wrist holds it at most: one that is held at more is refused in homing, by that."""
 # Gains that say how a controller damps or what part of it is a network's, and not how strong it is.
 _NO_SIZE = ("zeta", "phi", "beta")
 
@@ -51,6 +59,9 @@ def drawn(number: int) -> Rig:
     rng = np.random.default_rng([SEED, number])
     settings = rig_settings(rng, number)
     wrist = WRIST if number % 2 == 0 else _wrist(rng, settings["bench"]["plant"]["stiffness_scale"])
+    plant = settings["bench"]["plant"]
+    most = math.radians(RUBS_DEG) * _upright(wrist, plant["stiffness_scale"])
+    settings = over(settings, {"bench": {"plant": {"inner_friction": min(most, plant["inner_friction"])}}})
     law = scaled_to(wrist, controller(LAWS[number % len(LAWS)]))
     factor = float(np.exp(rng.uniform(np.log(0.7), np.log(1.2))))
     gains = {name: value * (1.0 if name in _NO_SIZE else factor) for name, value in law.presets["hardware"].items()}
@@ -64,13 +75,19 @@ def drawn(number: int) -> Rig:
 
 
 def _wrist(rng: np.random.Generator, weakened: float) -> WristParameters:
-    """Another wrist, upright, that does not buckle with its springs weakened so."""
+    """Another wrist, upright, that does not buckle with its springs weakened so, a fifth in hand."""
     while True:
         stiffness = math.exp(rng.uniform(math.log(0.2), math.log(3.0)))
         length, hand = float(rng.uniform(0.06, 0.14)), float(rng.uniform(0.0, 0.5))
         wrist = WristParameters(length=length, stiffness=stiffness, hand_mass=hand)
-        if math.isfinite(sag_of(wrist.model_copy(update={"stiffness": weakened * stiffness}), "ulnar")):
+        if math.isfinite(sag_of(wrist.model_copy(update={"stiffness": weakened / _IN_HAND * stiffness}), "ulnar")):
             return wrist
+
+
+def _upright(wrist: WristParameters, weakened: float) -> float:
+    """Stiffness [N m/rad] of an upright wrist with its springs weakened so, less what its weight takes."""
+    tips = wrist.hand_mass * (wrist.length / 3.0 + wrist.hand_offset) + wrist.mass * wrist.length / 12.0
+    return weakened * wrist.stiffness + wrist.gravity[0] * tips
 
 
 def _in_one_plane(rng: np.random.Generator) -> dict[str, Any]:
@@ -91,22 +108,44 @@ def _in_two_planes(rng: np.random.Generator, number: int) -> dict[str, Any]:
 
 
 def ended_on(number: int) -> Ended:
-    """How the trial of this rig ended."""
+    """How the trial of this rig ended, or that its motion needs more than `hw-run` lets real motors try.
+
+    Where it is stopped and the friction of its sheaths asks a motor for more than it has, that has slipped.
+    """
     wrist, settings = drawn(number)
+    asked = HwRunSettings.model_validate(settings)
+    if (need := needed(asked, wrist)) > (most := asked_at_most(asked, wrist)):
+        return Ended(
+            f"{REFUSED}: it needs {need:.0f} N, and {most:.0f} N is asked of motors", "", math.nan, math.nan, math.nan
+        )
     taken = {"kind": "payload-taken", "size": settings.get("payload", 0.0), "at": TAKEN, "since": "first trial"}
-    return performed(settings, injecting([taken] if "payload" in settings else []), wrist, seed=number)
+    end = performed(settings, injecting([taken] if "payload" in settings else []), wrist, seed=number)
+    tendons, pulls = settings["bench"]["actuator"], asked.safety.motor_pull
+    at_motor = need * math.exp(tendons["friction"] * tendons["sheath"])
+    if end.outcome == "ok" or at_motor < pulls:
+        return end
+    return end._replace(outcome=f"{SLIPPED}: it pulls {pulls:.0f} N, and {at_motor:.0f} N is asked: {end.outcome}")
 
 
 def page(ends: dict[int, Ended]) -> str:
     """The table: a row for each rig."""
-    stopped, left = sum(ended.outcome != "ok" for ended in ends.values()), RIGS - len(ends)
+    stopped, left = len(stopped_of(ends)), RIGS - len(ends)
+    beyond, slipped = (sum(end.outcome.startswith(how) for end in ends.values()) for how in (REFUSED, SLIPPED))
+    others = ""
+    if beyond:
+        others += (
+            f"Of {beyond} more the motion is refused before a motor turns: it needs more than motors are asked for."
+        )
+    if slipped:
+        others += f" Of {slipped} a motor slips, since its sheath rubs: they are stopped, as they should."
     told = f"""
-        {len(ends)} sound rigs were drawn, homed and tried once; stopped: {stopped}. Drawn are springs of 0.6 to 1.2
-        of what is believed, tendons of 5 to 50 kN/m (believed: 20), pulleys, sheaths of 0 to 2 rad, friction, creep,
-        poses and lenses of cameras, light, latency and USB adapter. Every second wrist has another length, stiffness
-        and hand, and gains scaled to it; gains are 0.7 to 1.2 of the preset `hardware`; every fourth hand takes up a
-        load that was declared; every fifth rig bends in two planes. A person pushes against the bend. Made by
-        `make sound-rigs`{f"; {left} more are to be tried" if left > 0 else ""}.
+        {len(ends) - beyond - slipped} sound rigs were drawn, homed and tried once; stopped: {stopped}. {others} Drawn
+        are springs of 0.6 to 1.2 of what is believed, tendons of 5 to 50 kN/m (believed: 20), pulleys, sheaths of 0 to
+        2 rad, friction, creep, poses and lenses of cameras, light, latency and USB adapter. Every second wrist has
+        another length, stiffness and hand, and gains scaled to it; gains are 0.7 to 1.2 of the preset `hardware`; every
+        fourth hand takes up a load that was declared; every fifth rig bends in two planes. Springs are stiffer than
+        what holds the hand up by a fifth at least, and friction inside holds a wrist bent by {RUBS_DEG:g} deg at most.
+        A person pushes against the bend. Made by `make sound-rigs`{f"; {left} more are to be tried" if left else ""}.
     """
     lines = [
         "# Sound rigs that are stopped all the same", "",
@@ -115,7 +154,7 @@ def page(ends: dict[int, Ended]) -> str:
         "| limit of tension [N] | true pull [N] | true error [deg] | end |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
-    for number, ended in ends.items():
+    for number, end in ends.items():
         wrist, settings = drawn(number)
         bench, reference = settings["bench"], settings["reference"]
         motion = reference.get("kind", settings["directions"][0])
@@ -123,25 +162,29 @@ def page(ends: dict[int, Ended]) -> str:
             f"| {number} | {settings.get('planes', 1)} | {1e3 * wrist.length:.0f} mm, {wrist.stiffness:.2g} N m/rad, "
             f"{wrist.hand_mass:.2g} kg | {bench['plant']['stiffness_scale']:.2f} "
             f"| {1e-3 * bench['actuator']['tendon_stiffness']:.0f} | {settings['controllers'][0]['controller']} "
-            f"| {motion}, {reference['angle_deg']:.0f} deg | {settings.get('payload', 0.0):.2g} | {ended.limit:.0f} "
-            f"| {ended.pull:.0f} | {np.degrees(ended.error):.1f} | {ended.outcome.replace('|', '/')[:160]} |"
+            f"| {motion}, {reference['angle_deg']:.0f} deg | {settings.get('payload', 0.0):.2g} | {end.limit:.0f} "
+            f"| {end.pull:.0f} | {np.degrees(end.error):.1f} | {end.outcome.replace('|', '/')[:160]} |"
         )
     return "\n".join(lines) + "\n"
 
 
+def stopped_of(ends: dict[int, Ended]) -> list[int]:
+    """Numbers of the rigs that were stopped, in homing or in a trial."""
+    return [number for number, ended in ends.items() if not ended.outcome.startswith(("ok", REFUSED, SLIPPED))]
+
+
 def main() -> int:
-    """Try rigs, name those that were stopped, and write the page of those from the first on."""
-    asked = options(__doc__, RIGS, "sound-rigs").parse_args()
-    ends: dict[int, Ended] = {}
+    """Try rigs, name those that were stopped, and write the page of all that were tried."""
+    asked = options(__doc__, RIGS, "sound-rigs", COMMITTED).parse_args()
     for number, kept in tried(asked, ended_on):
-        ends[number] = ended = Ended(*kept)
-        print(f"rig {number}: {ended.outcome}; {ended.odd}", flush=True)
-        if ended.outcome != "ok":
+        came = Ended(*kept)
+        print(f"rig {number}: {came.outcome}; {came.odd}", flush=True)
+        if stopped_of({number: came}):
             print(json.dumps(drawn(number).settings, default=list), flush=True)
-    stopped = sum(ended.outcome != "ok" for ended in ends.values())
-    print(f"{len(ends) - stopped} of {len(ends)} sound rigs went through")
-    if asked.first == 0:
-        PAGE.write_text(page(ends))
+    ends = {number: Ended(*kept) for number, kept in ended(asked).items()}
+    PAGE.write_text(page(ends))
+    stopped = len(stopped_of(ends))
+    print(f"{stopped} of {len(ends)} sound rigs were stopped")
     return stopped
 
 
