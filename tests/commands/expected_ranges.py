@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 
 from tests.commands.recommended_rigs import SPRINGS, drawn
-from tests.drawn_rigs import ended, options, tried
+from tests.drawn_rigs import COMMITTED, ended, options, tried
 from wristctl.commands.inputs_of_loops import why_two_planes
 from wristctl.commands.recommend.command import SCALED
-from wristctl.commands.recommend.expected import Candidate, asked_for, rigs_asked, spread
+from wristctl.commands.recommend.expected import FACTS as FACTS_OF_RIGS
+from wristctl.commands.recommend.expected import IDENTIFIED, Candidate, asked_for, known_of, rigs_asked, spread
 from wristctl.commands.recommend.own_rig import on_the_rig
 from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs, reach_deg
 from wristctl.commands.recommend.rehearsals import _asked, _quietly, motions_of_trial
@@ -51,14 +52,14 @@ FACTS: Mapping[str, tuple[str, ...]] = {
     "how the wrist bends": ("plant_segments", "plant.model"),
 }
 """What is drawn of a rig."""
-WAYS = ("believed", "measured")
-"""Stretch of the tendons by which trials wind."""
+WAYS = ("believed", "measured", "identified")
+"""Stretch of the tendons by which trials wind; in the last rigs are drawn as an identification leaves them."""
 
 
 def study_of(number: int, way: str, seed: int = 0, rigs: int = 200) -> Study:
     """The study of a wrist whose trials wind so, with so many simulated rigs of a seed."""
     study = drawn(number).study
-    homing = study.hw_run.homing.model_copy(update={"stretch": way})
+    homing = study.hw_run.homing.model_copy(update={"stretch": way if way == WAYS[0] else WAYS[1]})
     changes = {
         "seed": seed,
         "hw_run": study.hw_run.model_copy(update={"homing": homing}),
@@ -88,6 +89,8 @@ def tried_out(number: int) -> dict[str, Any]:
         best = preset(study)
         motions, horizon = motions_of_trial(study, reach, planes)
         asked = asked_for(family_of_rigs(study, reach), motions, horizon)
+        if way == WAYS[2]:
+            asked = known_of(asked, [fact for fact in FACTS_OF_RIGS if fact.how == IDENTIFIED])
         rigs = rigs_asked(study, best, asked).following
         fresh = rigs_asked(study_of(number, way, 1, FRESH), best, asked).following
         low, _, high = ends = spread(rigs)
@@ -172,8 +175,10 @@ _HEAD = """
 [these](hardware/recommended-rigs.md). All have the scaled preset of ct-dob: 200 rigs, and the share of 100 others
 within that range. `believed`: trials wind by the stretch of tendons as they are believed, and date pictures by a delay
 that may be a frame off. `measured`: as `recommend` does now, the steps per radian of homing tell the stretch, and the
-check of a rig the age of pictures. Rigs whose motors stand at their limit are not counted. The last column has true
-errors of the emulated rig, where it was tried. `python -m tests.commands.expected_ranges --emulated` goes on there.
+check of a rig the age of pictures. `identified`: the same once `identify` has told springs, damping, tendons, their
+friction and the delay of the camera, as `recommend --from-identified` has it. Rigs whose motors stand at their limit
+are not counted. The last column has true errors of the emulated rig, where it was tried.
+`python -m tests.commands.expected_ranges --emulated` goes on there.
 """
 _LEFT = """
 What each fact makes of the second range: the share of the variance of ln RMSE that goes once the fact is as believed,
@@ -183,7 +188,7 @@ and the range that is left [deg]. Shares below 10 % are noise of 200 rigs; negat
 
 def main() -> int:
     """Try wrists and write the page."""
-    parser = options(__doc__, len(WRISTS), "expected-ranges")
+    parser = options(__doc__, len(WRISTS), "expected-ranges", COMMITTED)
     parser.add_argument("--emulated", action="store_true", help="the emulated rig, too")
     parser.add_argument("--facts", action="store_true", help="each fact known, too")
     asked = parser.parse_args()

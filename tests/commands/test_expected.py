@@ -16,11 +16,11 @@ from wristctl.commands.recommend.expected import (
     Expected,
     Fact,
     Left,
-    _known,
     _narrower,
     _over_rigs,
     asked_for,
     expected,
+    known_of,
     spread,
 )
 from wristctl.config.loop import Reference
@@ -110,15 +110,15 @@ def test_what_is_known_is_no_wider_than_a_study_says() -> None:
     assert _narrower("x0.6..1.4", "x0.9..1.1") == "x0.9..1.1" == _narrower("0.03..0.2", "x0.9..1.1")
     assert _narrower("x0.95..1.05", "x0.9..1.1") == "x0.95..1.05" and _narrower((1.0, 2.0), "x0.9..1.1") == "x0.9..1.1"
     asked = asked_for(study_of().recommend.family(20.0), [Reference()], 5.0)
-    assert "plant.hand_mass" in asked.draw and "plant.hand_mass" not in _known(asked, [HAND]).draw
-    both = _known(asked, [TENDONS, SPRINGS]).draw
+    assert "plant.hand_mass" in asked.draw and "plant.hand_mass" not in known_of(asked, [HAND]).draw
+    both = known_of(asked, [TENDONS, SPRINGS]).draw
     late, measured = "plant.sensor.delay_frames", study_of().recommend.measured().draw
     assert both == measured | {late: asked.draw[late]}
     identified = study_of().model_copy(update={"recommend": study_of().recommend.measured()}).recommend.family(20.0)
     again = asked_for(identified, [Reference()], 5.0)
-    assert _known(again, [TENDONS]) == again == _known(again, [SPRINGS]) and _known(again, [CAMERA]) != again
+    assert known_of(again, [TENDONS]) == again == known_of(again, [SPRINGS]) and known_of(again, [CAMERA]) != again
     assert (
-        _known(again, [CAMERA]).draw["plant.sensor.delay_frames"] == "1.5..2.5"
+        known_of(again, [CAMERA]).draw["plant.sensor.delay_frames"] == "1.5..2.5"
         and _narrower("1.9..2", "1..3") == "1.9..2"
     )
 

@@ -174,7 +174,7 @@ def expected(study: Study, best: Candidate, family: Family, reach_deg: float, pl
     if not found.high > _WIDE * found.low:
         return found
     left = []
-    facts = [fact for fact in FACTS if _known(asked, [fact]) != asked]
+    facts = [fact for fact in FACTS if known_of(asked, [fact]) != asked]
     identified = [fact for fact in facts if fact.how == IDENTIFIED]
     for some in ([fact] for fact in facts):
         left.append(_left(study, best, asked, some))
@@ -190,11 +190,11 @@ def asked_for(family: Family, motions: Sequence[Reference], horizon: float) -> F
 
 
 def _left(study: Study, best: Candidate, asked: Family, facts: Sequence[Fact]) -> Left:
-    low, _, high, *_ = _over_rigs(study, best, _known(asked, facts))
+    low, _, high, *_ = _over_rigs(study, best, known_of(asked, facts))
     return Left(tuple(facts), low, high)
 
 
-def _known(family: Family, facts: Sequence[Fact]) -> Family:
+def known_of(family: Family, facts: Sequence[Fact]) -> Family:
     """The rigs once these facts are known: as an identification leaves them, any other as it is believed."""
     keys, measured = {key for fact in facts for key in fact.keys}, MEASURED | {DELAY: known_delay(family.loop)}
     draw = {
