@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,8 @@ import wristctl
 from tests.commands.conftest import session
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import (
+    asked_of_search,
+    asked_of_simulation,
     check_inverses,
     check_reach,
     check_row,
@@ -23,13 +26,15 @@ from wristctl.commands.inputs_of_loops import (
     tuned_gains,
     tuned_on,
 )
-from wristctl.commands.loop_warnings import warn_if_it_buckles, warn_if_outside
+from wristctl.commands.loop_warnings import warn_if_it_buckles, warn_if_outside, warn_of_loops
 from wristctl.commands.results import Findings
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
+from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation import worlds
+from wristctl.simulation.planes import Asked
 from wristctl.wrist import statics
 
 STUDY = wristctl.load_study(None)
@@ -138,9 +143,23 @@ def test_the_least_stiff_loop_says_whether_the_wrist_buckles(
     known = {((0.25, plant), at): value for at, value in enumerate(stiffness, start=1)}
     monkeypatch.setattr(statics, "least_stiffness", lambda made, segments: known[made, segments])
     with caplog.at_level(logging.WARNING):
-        warn_if_it_buckles(findings, WRIST, [Loop(plant_segments=1), Loop(plant_segments=2)])
+        warn_if_it_buckles(findings, WRIST, [Loop(plant_segments=1), Loop(plant_segments=2)], 1)
     assert noted == {"least_stiffness": min(stiffness), "buckles": buckles}
     assert len(caplog.messages) == buckles and (f"{min(stiffness):.3g} N m/rad" in caplog.text) == buckles
+
+
+@pytest.mark.parametrize(("section", "asked"), [("simulate", asked_of_simulation), ("tune", asked_of_search)])
+@pytest.mark.parametrize(("kind", "buckles"), [("circumduction", True), ("minimum-jerk", False)])
+def test_a_wrist_that_falls_over_in_its_second_plane_is_warned_of_where_a_motion_bends_it_there(
+    caplog: pytest.LogCaptureFixture, section: str, asked: Callable[[Study], Sequence[Asked]], kind: str, buckles: bool
+) -> None:
+    study = wristctl.load_study(
+        None, "wrist.flexion_ratio=0.2", f"simulate.reference.kind={kind}",
+        f"tune.scenarios=[{{loop: exact, reference: {{kind: {kind}}}}}]",
+    )  # fmt: skip
+    with caplog.at_level(logging.WARNING):
+        warn_of_loops(session(study).findings, study, getattr(study, section), asked(study))
+    assert ("the straight wrist buckles" in caplog.text) == buckles
 
 
 def test_a_reference_out_of_reach_is_named_by_its_place(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.inputs import Inputs
@@ -39,7 +39,7 @@ def warn_if_outside(share: float) -> None:
         log.warning("%.3g %% of the wanted tips lie outside what the network learned: guesses", 100.0 * share)
 
 
-def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop], planes: int = 1) -> None:
+def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop], planes: int) -> None:
     """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
     from wristctl.simulation.worlds import plant_of
     from wristctl.wrist.spatial.spatial_statics import least_stiffness_at_pretension
@@ -255,13 +255,14 @@ def warn_of_loops(
     findings: Findings,
     study: Study,
     settings: SimulateSettings | TuneSettings | CompareSettings,
-    asked: Iterable[Asked],
-    planes: int = 1,
+    asked: Sequence[Asked],
 ) -> list[OutOfReach]:
     """Warn of loops of a section that buckle or are integrated coarsely, of what is left out of one plane, and of
     motions out of reach; these are returned."""
+    from wristctl.simulation.planes import planes_of
+
     loops = [settings.loop] if isinstance(settings, SimulateSettings) else list(judged_loops(study, settings).values())
-    warn_if_it_buckles(findings, study.wrist, loops, planes)
+    warn_if_it_buckles(findings, study.wrist, loops, planes_of(study.wrist, asked))
     warn_if_coarse(loops)
     warn_of_one_plane(study.wrist, asked)
     return warn_out_of_reach(findings, study.wrist, asked_by(study, settings))

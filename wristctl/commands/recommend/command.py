@@ -98,11 +98,12 @@ def recommend(session: Session) -> Recommended:
     known, findings = identified(session.study, "recommend", session.inputs), session.findings
     study = on_the_rig(known)
     settings, reach = study.recommend, reach_deg(study)
-    warn_if_it_buckles(findings, study.wrist, [settings.loop])
-    warn_if_coarse([settings.loop])
-    warn_of_one_plane(study.wrist, asked_of_rigs(study))
-    family, bending = family_of_rigs(study, reach), why_two_planes(study.wrist, asked_of_rigs(study))
+    asked = asked_of_rigs(study)
+    family, bending = family_of_rigs(study, reach), why_two_planes(study.wrist, asked)
     planes = 2 if bending else 1
+    warn_if_it_buckles(findings, study.wrist, [settings.loop], planes)
+    warn_if_coarse([settings.loop])
+    warn_of_one_plane(study.wrist, asked)
     facts = "" if settings.rig is None else said_of_facts(study)
     check_homing(study, planes)
     for split in ("tune", "validation", "test"):

@@ -81,7 +81,7 @@ def simulate(session: Session) -> Simulated:
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist, planes = study.simulate, study.wrist, planes_of_simulation(study)
     warn_outside_conditions([settings], [settings.loop])
-    beyond = warn_of_loops(findings, study, settings, asked_of_simulation(study), planes)
+    beyond = warn_of_loops(findings, study, settings, asked_of_simulation(study))
     network = network_for(session.inputs, wrist, [settings.loop], planes)
     with session.progress("simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
