@@ -28,11 +28,14 @@ QUICK = {"move": 1e-4, "rest": 0.15, "frames": 5, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(seed: int = 0, wrist: WristParameters = WRIST, plant: dict[str, Any] | None = None, **motors: Any) -> Zero:
-    settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}, "plant": plant or {}})
-    bench, layout = bench_of(settings, seed, wrist), layout_of_rig(settings, wrist)
-    tracking = EmulatedTestbed(bench, settings, [View(), View()], None).tracking()
-    board = Board(bench.transport)
+def homed(
+    seed: int = 0, wrist: WristParameters = WRIST, friction: float = 0.0, pull: float = 6e-4, **motors: Any
+) -> Zero:
+    bench = {"motors": {"slack": SLACK, **motors}, "plant": {"inner_friction": friction}}
+    settings = circling(homing=QUICK | {"pull": pull}, bench=bench)
+    rig, layout = bench_of(settings, seed, wrist), layout_of_rig(settings, wrist)
+    tracking = EmulatedTestbed(rig, settings, [View(), View()], None).tracking()
+    board = Board(rig.transport)
     board.connect()
     patience = Patience(board)
     patience.stand_square(tracking, settings.homing)
@@ -72,8 +75,15 @@ def test_three_tendons_at_drawn_places_are_found_there_and_exchanged_ones_named(
 def test_tendons_of_a_soft_wrist_that_rests_off_straight_by_its_own_friction_are_found_where_they_are() -> None:
     """Its springs hold the hand up by little more than its weight: friction keeps it bent as far as homing bends it."""
     wrist = WristParameters(length=0.11, hand_mass=0.19, stiffness=0.3)
-    off = np.array(homed(27, wrist, {"inner_friction": 0.0136}).directions) - pull_directions()
+    off = np.array(homed(27, wrist, 0.0136).directions) - pull_directions()
     assert np.degrees(np.abs(np.angle(np.exp(1j * off)))).max() < 12.0
+
+
+@pytest.mark.slow
+def test_tendons_may_be_let_out_further_than_the_longest_slack_is() -> None:
+    """They are let out by twice `homing.pull`; the board lets nothing unhomed go further than homing does."""
+    zero = homed(pull=1.3e-3)
+    assert zero.slack == pytest.approx(SLACK, abs=5e-5)
 
 
 @pytest.mark.slow

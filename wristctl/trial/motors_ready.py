@@ -112,7 +112,8 @@ def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> 
     furthest = round(limits.travel / spools.step)
     ramps = Configure(limits.watchdog, int(limits.hold), round(settings.actuator.ramp))
     homing = settings.homing
-    jog = round((homing.slack + homing.pull + 3.0 * homing.move if reach is None else reach) / spools.step)
+    creeps = max(homing.slack + homing.pull, 2.0 * homing.pull) + 3.0 * homing.move  # in, and let out
+    jog = round((creeps if reach is None else reach) / spools.step)
     board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4, jog))
     board.enable()
     return cleared
