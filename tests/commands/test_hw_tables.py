@@ -23,6 +23,7 @@ from wristctl.commands.printed_table import Table, two
 from wristctl.commands.progress import watched
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session, Unattended
+from wristctl.config.study import Study
 from wristctl.records import start_run
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory
@@ -82,6 +83,22 @@ def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings,
         session = Session(study, Inputs(), findings, watched(None), Unattended())
         done = performed(session, trials(), None, None)
     return list(done.tables), findings, done.twins
+
+
+@pytest.mark.parametrize(("pull", "limit"), [(30.0, 24.0), (100.0, 60.0)])
+def test_simulated_trials_ask_motors_for_no_more_than_trials_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pull: float, limit: float
+) -> None:
+    """Four fifths of what they pull, or what the wrist bears: a motion that needs more is left behind in both."""
+    limits: list[float] = []
+
+    def twin(study: Study, *_: Any, seen: bool) -> Simulation:
+        limits.append(study.wrist.tension_limit)
+        return repeated("twin", [1.0], steady_state=0.5).first
+
+    monkeypatch.setattr("wristctl.trial.trial_results.twin", twin)
+    tables(tmp_path, f"{ROWS}, safety: {{motor_pull: {pull}}}")
+    assert set(limits) == {limit}
 
 
 def test_the_papers_numbers_stand_beside_its_own_law_alone(

@@ -106,10 +106,13 @@ def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, t
 def twins_of(
     session: Session, done: pd.DataFrame, network: Inverse | None, tuned: Gains | None
 ) -> dict[int, Simulation]:
-    """Simulation of every trial that ended well, by its number. Repetitions share one."""
+    """Simulation of every trial that ended well, by its number, whose motors are asked for no more than in the trial.
+    Repetitions share one."""
+    from wristctl.trial.experiment import spared
     from wristctl.trial.trial_results import twin
     from wristctl.trial.trials import Trial
 
+    study = session.study.model_copy(update={"wrist": spared(session.study.wrist, session.study.hw_run)})
     names = [row.label for row in session.study.hw_run.rows]
     simulated: dict[tuple[Any, ...], Simulation] = {}
     twins = {}
@@ -119,7 +122,7 @@ def twins_of(
             seen = not math.isfinite(row.get("true_rmse", math.nan))
             if key not in simulated:
                 trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
-                simulated[key] = twin(session.study, trial, network, tuned, seen=seen)
+                simulated[key] = twin(study, trial, network, tuned, seen=seen)
             twins[row["trial"]] = simulated[key]
     return twins
 
