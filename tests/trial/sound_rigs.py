@@ -162,10 +162,14 @@ def page(ends: dict[int, Ended]) -> str:
             f"| {number} | {settings.get('planes', 1)} | {1e3 * wrist.length:.0f} mm, {wrist.stiffness:.2g} N m/rad, "
             f"{wrist.hand_mass:.2g} kg | {bench['plant']['stiffness_scale']:.2f} "
             f"| {1e-3 * bench['actuator']['tendon_stiffness']:.0f} | {settings['controllers'][0]['controller']} "
-            f"| {motion}, {reference['angle_deg']:.0f} deg | {settings.get('payload', 0.0):.2g} | {end.limit:.0f} "
-            f"| {end.pull:.0f} | {np.degrees(end.error):.1f} | {end.outcome.replace('|', '/')[:160]} |"
+            f"| {motion}, {reference['angle_deg']:.0f} deg | {settings.get('payload', 0.0):.2g} "
+            f"| {_cell(end.limit)} | {_cell(end.pull)} | {_cell(math.degrees(end.error), 1)} | {end.outcome.replace('|', '/')[:160]} |"
         )
     return "\n".join(lines) + "\n"
+
+
+def _cell(value: float, digits: int = 0) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
 def stopped_of(ends: dict[int, Ended]) -> list[int]:
