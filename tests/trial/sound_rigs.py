@@ -157,13 +157,13 @@ def page(ends: dict[int, Ended]) -> str:
     for number, end in ends.items():
         wrist, settings = drawn(number)
         bench, reference = settings["bench"], settings["reference"]
-        motion = reference.get("kind", settings["directions"][0])
+        motion, came = reference.get("kind", settings["directions"][0]), end.outcome.replace("|", "/")[:160]
         lines.append(
             f"| {number} | {settings.get('planes', 1)} | {1e3 * wrist.length:.0f} mm, {wrist.stiffness:.2g} N m/rad, "
             f"{wrist.hand_mass:.2g} kg | {bench['plant']['stiffness_scale']:.2f} "
             f"| {1e-3 * bench['actuator']['tendon_stiffness']:.0f} | {settings['controllers'][0]['controller']} "
             f"| {motion}, {reference['angle_deg']:.0f} deg | {settings.get('payload', 0.0):.2g} "
-            f"| {_cell(end.limit)} | {_cell(end.pull)} | {_cell(math.degrees(end.error), 1)} | {end.outcome.replace('|', '/')[:160]} |"
+            f"| {_cell(end.limit)} | {_cell(end.pull)} | {_cell(math.degrees(end.error), 1)} | {came} |"
         )
     return "\n".join(lines) + "\n"
 
