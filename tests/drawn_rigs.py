@@ -21,29 +21,41 @@ def options(description: str | None, count: int, kept: str, within: Path = Path(
     return parser
 
 
+class Kept:
+    """What trials came to, by what each was of: a line of JSON for each, so that several programs may add to a file."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    def add(self, of: int | str, came: Any) -> None:
+        """Keep what one came to."""
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        with self._file.open("a") as lines:
+            lines.write(json.dumps({"of": of, "came": came}, default=_plain) + "\n")
+
+    def all(self) -> dict[Any, Any]:
+        """What all came to, in order; of one that was tried twice the last."""
+        lines = self._file.read_text().splitlines() if self._file.is_file() else []
+        return dict(sorted((line["of"], line["came"]) for line in map(json.loads, lines)))
+
+
 def tried(asked: argparse.Namespace, trial: Callable[[int], Any], beside: str = "tried") -> Iterator[tuple[int, Any]]:
     """Each rig's number with what its trial came to, as JSON has it; `beside` names the file of what is kept."""
-    before, file = ended(asked, beside), _file(asked, beside)
-    file.parent.mkdir(parents=True, exist_ok=True)
+    kept, before = _kept(asked, beside), ended(asked, beside)
     for number in range(asked.first, asked.first + asked.count):
         if number not in before:
-            line = json.dumps({"number": number, "came": trial(number)}, default=_plain)
-            with file.open("a") as kept:
-                kept.write(f"{line}\n")
-            before[number] = json.loads(line)["came"]
+            kept.add(number, trial(number))
+            before = kept.all()
         yield number, before[number]
 
 
 def ended(asked: argparse.Namespace, beside: str = "tried") -> dict[int, Any]:
     """What every rig came to that has been tried, by its number, in this order."""
-    file = _file(asked, beside)
-    lines = [json.loads(line) for line in file.read_text().splitlines()] if file.is_file() else []
-    return dict(sorted((line["number"], line["came"]) for line in lines))
+    return _kept(asked, beside).all()
 
 
-def _file(asked: argparse.Namespace, beside: str) -> Path:
-    file: Path = asked.kept / f"{beside}.jsonl"
-    return file
+def _kept(asked: argparse.Namespace, beside: str) -> Kept:
+    return Kept(asked.kept / f"{beside}.jsonl")
 
 
 def _plain(value: Any) -> Any:

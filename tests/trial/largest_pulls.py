@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import math
 import sys
 import textwrap
@@ -21,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.drawn_rigs import COMMITTED, Kept
 from tests.trial import hands
 from tests.trial.conftest import WRIST
 from tests.trial.fault_runs import Prepared, forked, injecting, over
@@ -85,8 +85,8 @@ class Case(NamedTuple):
 
     @property
     def named(self) -> str:
-        """Both, for a file."""
-        return self.name.replace("/", " of ") + "".join(f" {axis}" for axis in self.axes)
+        """Both."""
+        return self.name + "".join(f" {axis}" for axis in self.axes)
 
     def change(self, at: float) -> Prepared:
         """What makes it happen so long after the first trial began [s]."""
@@ -114,51 +114,49 @@ class Load(NamedTuple):
     wrist: str
     declared: bool
 
+    @property
+    def named(self) -> str:
+        """Both."""
+        return f"{self.wrist}, {'declared' if self.declared else 'undeclared'}"
+
 
 # A load's end by current and motion.
 Loads = Mapping[tuple[Load, str, str], Ended]
 LOADS = tuple(Load(*each) for each in itertools.product(WRISTS, (True, False)))
 
 
-def _file(kept: Path, case: Case, current: str, motion: str) -> Path:
-    return kept / f"{current}-{motion}-{case.named}.json"
+def _key(of: Case | Load, current: str, motion: str) -> str:
+    return f"{current}, {motion}: {of.named}"
 
 
-def _file_of_load(kept: Path, load: Load, current: str, motion: str) -> Path:
-    return kept / f"{current}-{motion}-{load.wrist}-{'declared' if load.declared else 'undeclared'}.json"
-
-
-def try_faults(current: str, motion: str, kept: Path, workers: int) -> None:
+def try_faults(current: str, motion: str, kept: Kept, workers: int) -> None:
     """A motion with each case that has not been tried before."""
-    settings, at = TRIED[motion]
-    if left := [case for case in CASES if not _file(kept, case, current, motion).is_file()]:
+    (settings, at), before = TRIED[motion], kept.all()
+    if left := [case for case in CASES if _key(case, current, motion) not in before]:
         run = partial(performed, over(settings, CURRENTS[current]), at=at)
         for number, ended in forked(run, [each.change(at) for each in left], "first trial", at, workers).items():
-            _file(kept, left[number], current, motion).write_text(json.dumps(ended))
+            kept.add(_key(left[number], current, motion), ended)
 
 
-def try_load(load: Load, current: str, motion: str, kept: Path) -> None:
+def try_load(load: Load, current: str, motion: str, kept: Kept) -> None:
     """A motion in which the hand takes up a load, if it has not been tried before."""
-    (settings, at), file = TRIED[motion], _file_of_load(kept, load, current, motion)
-    if not file.is_file():
+    settings, at = TRIED[motion]
+    if (key := _key(load, current, motion)) not in kept.all():
         declared = {"payload": PAYLOAD} if load.declared else {}
         taken = injecting([{"kind": "payload-taken", "size": PAYLOAD, "at": at, "since": "first trial"}])
         changes = over(over(settings, CURRENTS[current]), declared)
-        file.write_text(json.dumps(performed(changes, taken, WRISTS[load.wrist], at)))
+        kept.add(key, performed(changes, taken, WRISTS[load.wrist], at))
 
 
-def kept_in(folder: Path) -> tuple[Table, Loads]:
+def all_of(kept: Kept) -> tuple[Table, Loads]:
     """All that has been tried."""
-    columns = list(itertools.product(CURRENTS, TRIED))
-    cases = {(case, *column): _file(folder, case, *column) for case in CASES for column in columns}
-    loads = {(load, *column): _file_of_load(folder, load, *column) for load in LOADS for column in columns}
-    return {each: _read(file) for each, file in cases.items() if file.is_file()}, {
-        each: _read(file) for each, file in loads.items() if file.is_file()
-    }
-
-
-def _read(file: Path) -> Ended:
-    return Ended(*json.loads(file.read_text()))
+    columns, came = list(itertools.product(CURRENTS, TRIED)), kept.all()
+    cases = {(case, *column): came.get(_key(case, *column)) for case in CASES for column in columns}
+    loads = {(load, *column): came.get(_key(load, *column)) for load in LOADS for column in columns}
+    return (
+        {each: Ended(*end) for each, end in cases.items() if end},
+        {each: Ended(*end) for each, end in loads.items() if end},
+    )
 
 
 def right(load: Load, ended: Ended) -> bool:
@@ -305,17 +303,17 @@ def main() -> int:
     parser.add_argument("--current", choices=CURRENTS, action="append", help="both unless named")
     parser.add_argument("--motion", choices=TRIED, action="append", help="all unless named")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--kept", type=Path, default=Path("build/largest-pulls"), help="what was tried before is here")
+    parser.add_argument("--kept", type=Path, default=COMMITTED / "largest-pulls.jsonl", help="what was tried before")
     parser.add_argument("--page", action="store_true", help="only write the page, of what was tried")
     asked = parser.parse_args()
-    asked.kept.mkdir(parents=True, exist_ok=True)
+    kept = Kept(asked.kept)
     chosen = itertools.product(() if asked.page else asked.motion or TRIED, asked.current or CURRENTS)
     for motion, current in chosen:
-        try_faults(current, motion, asked.kept, asked.workers)
+        try_faults(current, motion, kept, asked.workers)
         for load in LOADS:
-            try_load(load, current, motion, asked.kept)
+            try_load(load, current, motion, kept)
         print(f"{current}, {motion}: done", flush=True)
-    table, loads = kept_in(asked.kept)
+    table, loads = all_of(kept)
     PAGE.write_text(page(table, loads))
     missed = wrong(table, loads)
     print("\n".join(missed))
