@@ -172,6 +172,17 @@ def test_text_is_alike_but_for_its_numbers(tmp_path: Path) -> None:
     assert compare_files(first, second) == ("differs", "from line 2")
 
 
+def test_drawings_whose_hashed_names_alone_differ_are_alike_and_exchanged_ones_differ(tmp_path: Path) -> None:
+    """The names that matplotlib gives clip paths and markers hash last bits, which processors differ by."""
+    before, after, other = (tmp_path / f"{name}.svg" for name in ("before", "after", "other"))
+    drawn = '<clipPath id="{0}"/><path id="{1}" d="M 7.5 {2} L 1e3 0"/><use href="#{1}"/><g clip-path="url(#{3})"/>'
+    before.write_text(drawn.format("pbd3bcf6753", "m0123456789", 0.3, "pbd3bcf6753"))
+    after.write_text(drawn.format("pbb66218c93", "mabcdef0123", 0.1 + 0.2, "pbb66218c93"))
+    other.write_text(drawn.format("pbb66218c93", "mabcdef0123", 0.3, "mabcdef0123"))
+    assert compare_files(before, after).verdict == "within tolerance"
+    assert compare_files(before, other).verdict == "differs"
+
+
 @pytest.mark.parametrize("ending", [".npz", ".safetensors", ".png", ".csv"])
 def test_a_file_that_cannot_be_read_differs_and_says_why(tmp_path: Path, ending: str) -> None:
     before, now = tmp_path / f"before{ending}", tmp_path / f"now{ending}"

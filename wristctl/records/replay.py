@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
 # Pictures alike: mean difference of their pixels, of 1.
 _PIXELS = 0.02
+# Names of clip paths and markers in an SVG of matplotlib: hashes of their coordinates' last bits.
+_SVG_NAME = re.compile(r"\b[pm][0-9a-f]{10}\b")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -54,6 +56,8 @@ def compare_files(before: Path, after: Path) -> FileComparison:
                 from matplotlib.image import imread
 
                 return _compare_pictures(imread(before), imread(after))
+            case ".svg":
+                return _compare_texts(*(_svg_by_order(each.read_text(encoding="utf-8")) for each in (before, after)))
             case _:
                 return _compare_texts(before.read_text(encoding="utf-8"), after.read_text(encoding="utf-8"))
     except Exception as error:  # each format's reader has errors of its own for a file that is damaged
@@ -125,6 +129,12 @@ def _compare_pictures(a: np.ndarray, b: np.ndarray) -> FileComparison:
     return FileComparison(
         "within tolerance" if mean <= _PIXELS else "differs", f"mean difference of pixels {mean:.2g} of 1"
     )
+
+
+def _svg_by_order(text: str) -> str:
+    """An SVG whose hashed names are their numbers, in the order in which they first stand."""
+    numbers = dict[str, int]()
+    return _SVG_NAME.sub(lambda name: f"name-{numbers.setdefault(name[0], len(numbers))}", text)
 
 
 def _compare_texts(a: str, b: str) -> FileComparison:
