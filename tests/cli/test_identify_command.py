@@ -176,7 +176,7 @@ def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path:
     delay = found.metrics["delay"]
     assert delay["interval"][0] - 2e-3 < 0.04 < delay["interval"][1] + 2e-3
     assert found.metrics["tendon"]["value"] is None and found.metrics["error"]["value"] < 0.1
-    assert "Of 1600 samples the models are fitted at 801 instants" in out
+    assert "Of 1600 samples the models are fitted at 801 instants" in " ".join(out.split())
     to_paste = [line for line in out.splitlines() if line.startswith("wristctl recommend ")]
     assert len(to_paste) == 1 and to_paste[0].endswith("--set wrist.stiffness=VALUE")
     assert "not identifiable" in out
