@@ -123,8 +123,8 @@ def test_a_bend_is_an_axis_own_within_the_stated_angle_and_another_tendons_beyon
 
 
 @given(
-    axis=st.integers(0, 3), rests=st.floats(0.0, 2.0), toward=st.floats(0.0, 360.0), share=st.floats(-0.98, 0.98),
-    count=st.integers(3, 9),
+    axis=st.integers(0, 3), rests=st.floats(0.0, 2.0), toward=st.floats(0.0, 360.0),
+    share=st.floats(-0.98, 0.98), count=st.integers(3, 9),
 )  # fmt: skip
 def test_a_line_goes_where_bends_grow_wherever_the_wrist_rested_before(
     axis: int, rests: float, toward: float, share: float, count: int

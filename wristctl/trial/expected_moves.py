@@ -130,8 +130,8 @@ class ExpectedMoves:
         self.lever, self._stiffness = wrist.tendon_offset, max(0.0, across)
         self.own, self._numbers = getattr(settings, "rig", None) is not None, numbers_of(layout)
         self._alike = layout is None
-        words_of = words_of_rig if self.own else words_of_board
-        self._words = words_of(self._numbers, names_of_planes(settings.planes, facing))
+        named = names_of_planes(settings.planes, facing)
+        self._words = (words_of_rig if self.own else words_of_board)(self._numbers, named)
         if layout is not None:
             self.lever = float(np.abs(layout.cross_section).max())
             self._alone = _of_layout(wrist, layout, settings.planes)
@@ -146,10 +146,7 @@ class ExpectedMoves:
         """Axes that are measured one after the other: opposite pairs, and those alone that have none."""
 
     def steps(self, stiffness: float | None = None, harder: float = 1.0, axis: int | None = None) -> float:
-        """Reeled in for one radian of what counts, by tendons as believed or of this stiffness.
-
-        Of an axis of a rig whose tendons differ, or the mean of all.
-        """
+        """Steps for one radian of what counts, by tendons as believed or of this stiffness: their mean, or an axis'."""
         k, (_, path, torque, lever) = self._spools.stiffness if stiffness is None else stiffness, self._alone
         steps = path + harder * torque / (lever * k)
         if axis is not None and not self._alike:
@@ -271,15 +268,20 @@ class ExpectedMoves:
     def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
         """Direction [rad] in which bends grow with what an axis has reeled in, nan before one camera.
 
-        They may begin far off straight, where friction of its own keeps a wrist bent. Raises SafetyStop where the
-        direction is another tendon's; `moved` is the last bend against where the wrist rested before.
+        They grow from straight, unless they tell that a wrist that its friction holds began three standard errors off.
+        Raises SafetyStop where it is another tendon's; `moved` is the last bend against where the wrist rested before.
         """
         if self._planes == 1:
             self.judge_side(axis, moved)
             return math.nan
-        (theta, away), _ = np.polyfit(reeled, np.array(bends), 1)
-        self.judge_side(axis, Bend(theta, away))
-        return math.atan2(away, theta)
+        (x, y), seen = self._alone.toward[axis], np.array(bends)
+        along = np.polyval(np.polyfit(reeled, seen @ (x, y), 1), reeled)
+        (turned, off), covariance = np.polyfit(along, seen @ (-y, x), 1, cov="unscaled")
+        variance = float(np.var(seen @ (-y, x) - turned * along - off)) * len(seen) / (len(seen) - 2)
+        if off**2 <= 9.0 * variance * covariance[1, 1]:
+            turned = float(along @ seen @ (-y, x) / (along @ along))
+        self.judge_side(axis, grown := Bend(x - turned * y, y + turned * x))
+        return math.atan2(grown.away, grown.theta)
 
     def _stretch(self, stays: float) -> float:
         """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
@@ -344,8 +346,7 @@ class ExpectedMoves:
         if friction <= self._homing.sticks + 2.0 * self._stretch(stays):
             return
         problem = f"tendon {self._numbers[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
-        fix = "see whether it chafes or its sheath is bent sharply; or raise homing.sticks"
-        raise SafetyStop(problem, "homing", fix)
+        raise SafetyStop(problem, "homing", "see whether it chafes or a sheath is bent sharply; or raise homing.sticks")
 
     def judge_slackened(self, bend: Bend) -> None:
         """Raises SafetyStop where a wrist that nothing should hold moves when its tendons are let out further."""
@@ -375,8 +376,7 @@ class ExpectedMoves:
             f"side was let out; likely tendon {self._numbers[pulls]}{whose} and one opposite are shorter than the "
             f"motors' positions say: {self._words.against}"
         )
-        fix = f"see tendons, motor cables and their shields, then {self._words.again}"
-        return SafetyStop(problem, "homing", fix)
+        return SafetyStop(problem, "homing", f"see tendons, motor cables and their shields, then {self._words.again}")
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend, stiffness: float | None = None) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should.
