@@ -17,6 +17,9 @@ _APART = re.compile(r"\d{8}T\d{6}Z|-[0-9a-f]{6}\b|.*on this machine$|.*sha256 .*
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 LOOSE = 0.02
 """How far apart numbers may be that two machines print, as a share of them."""
+EMULATED, AT_REST_DEG = ("hw-run", "recommend"), 0.01
+"""Commands that try an emulated rig, and what its figures may be apart by beside: a wrist that rests swings by what its
+camera's noise makes of friction, and the last bits of that are the processor's own."""
 
 
 @pytest.fixture(scope="module")
@@ -28,15 +31,20 @@ def tutorials() -> ModuleType:
 def different(text: str, other: str) -> list[tuple[str, str]]:
     """Words of two pages that differ in order, numbers by more than LOOSE."""
     words, others = (_APART.sub("", each).split() for each in (text, other))
-    pairs = [pair for pair in zip(words, others, strict=False) if not _alike(*pair)]
+    pairs, before, command = list[tuple[str, str]](), "", ""
+    for word, another in zip(words, others, strict=False):
+        command = word if before == "wristctl" else command
+        if not _alike(word, another, AT_REST_DEG if command in EMULATED else 1e-9):
+            pairs.append((word, another))
+        before = word
     return pairs + [("", "")] * abs(len(words) - len(others))
 
 
-def _alike(word: str, other: str) -> bool:
+def _alike(word: str, other: str, apart: float) -> bool:
     if _NUMBER.sub("", word) != _NUMBER.sub("", other):
         return False
     numbers = [[float(number) for number in _NUMBER.findall(each)] for each in (word, other)]
-    return len(numbers[0]) == len(numbers[1]) and numbers[0] == pytest.approx(numbers[1], rel=LOOSE, abs=1e-9)
+    return len(numbers[0]) == len(numbers[1]) and numbers[0] == pytest.approx(numbers[1], rel=LOOSE, abs=apart)
 
 
 @pytest.mark.slow
