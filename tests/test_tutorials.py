@@ -132,5 +132,10 @@ def test_pages_are_alike_but_for_runs_machines_and_the_last_digits() -> None:
     page = "error 0.26 deg in results/20261129T193625Z-simulate-robot-12dcf7\ntime 0.07 us, on this machine\nok"
     assert not different(page, page.replace("193625", "203625").replace("12dcf7", "ab0001").replace("0.07", "9"))
     assert not different(page, page.replace("0.26", "0.261"))
+    tried = "$ wristctl hw-run\nswings by 0.05 deg, errs by 0.26 deg"
+    assert not different(tried, tried.replace("0.05", "0.057"))
+    for other in (tried.replace("0.05", "0.062"), tried.replace("0.26", "0.28")):
+        assert different(tried, other)
+    assert different(tried.replace("hw-run", "simulate"), tried.replace("hw-run", "simulate").replace("0.05", "0.057"))
     for other in (page.replace("0.26", "0.28"), page.replace("error", "Error"), page + " more", page[:-2]):
         assert different(page, other)
