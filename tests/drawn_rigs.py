@@ -36,7 +36,8 @@ class Kept:
     def all(self) -> dict[Any, Any]:
         """What all came to, in order; of one that was tried twice the last."""
         lines = self._file.read_text().splitlines() if self._file.is_file() else []
-        return dict(sorted((line["of"], line["came"]) for line in map(json.loads, lines)))
+        came = {line["of"]: line["came"] for line in map(json.loads, lines)}
+        return {of: came[of] for of in sorted(came)}
 
 
 def tried(asked: argparse.Namespace, trial: Callable[[int], Any], beside: str = "tried") -> Iterator[tuple[int, Any]]:

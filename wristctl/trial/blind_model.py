@@ -35,10 +35,12 @@ class BlindModel:
         layout: TendonLayout | None = None, payload: float = 0.0,
     ) -> None:  # fmt: skip
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
-        loaded = wrist.model_copy(update={"hand_mass": wrist.hand_mass + payload})
+        hands = [
+            wrist.model_copy(update={"hand_mass": wrist.hand_mass + load}) for load in dict.fromkeys((0.0, payload))
+        ]
         self._wrists = [
-            (RigBelief(each, tendons, planes, layout).known, np.zeros(OF_A_PLANE * len(planes)))
-            for each in (wrist, loaded)[: 2 if payload > 0.0 else 1]
+            (RigBelief(hand, tendons, planes, layout).known, np.zeros(OF_A_PLANE * len(planes)))
+            for hand in hands
             for tendons in (actuator, soft)
         ]
         self._period, self._tick = period, 0

@@ -274,12 +274,12 @@ class ExpectedMoves:
         if self._planes == 1:
             self.judge_side(axis, moved)
             return math.nan
-        (x, y), seen = self._alone.toward[axis], np.array(bends)
-        along = np.polyval(np.polyfit(reeled, seen @ (x, y), 1), reeled)
-        (turned, off), covariance = np.polyfit(along, seen @ (-y, x), 1, cov="unscaled")
-        variance = float(np.var(seen @ (-y, x) - turned * along - off)) * len(seen) / (len(seen) - 2)
-        if off**2 <= 9.0 * variance * covariance[1, 1]:
-            turned = float(along @ seen @ (-y, x) / (along @ along))
+        x, y = self._alone.toward[axis]
+        seen, aside = (np.array(bends) @ np.array([[x, -y], [y, x]])).T
+        along = np.polyval(np.polyfit(reeled, seen, 1), reeled)
+        (turned, off), covariance = np.polyfit(along, aside, 1, cov="unscaled")
+        if off**2 <= 9.0 * np.sum((aside - turned * along - off) ** 2) / (len(aside) - 2) * covariance[1, 1]:
+            turned = float(along @ aside / (along @ along))
         self.judge_side(axis, grown := Bend(x - turned * y, y + turned * x))
         return math.atan2(grown.away, grown.theta)
 
