@@ -51,14 +51,14 @@ def test_rows_come_by_loop_reference_direction_row_and_inverse(both: list[Compar
 
 
 def test_a_controller_by_its_name_alone_has_the_preset_of_each_loop() -> None:
-    """`default` where all is exact, `hardware` behind a camera, motors or a lag; one that has neither its first."""
+    """`default` where all is exact, `hardware` behind a camera, motors or a lag; one that lacks one has the other."""
     loops = "loops={exact: {}, seen: {sensor: {level: camera}}, lagged: {actuator: {level: lagged}}}"
     names = "controllers=[pid-ff, pid-ff/default, pid-ff/hardware, smc, smc/printed, smc/hardware]"
     rows = compare(study(names, loops, "inverses=[closed-form]", "references=[{duration: 0.1}]"))
     rmse = {(row.loop, row.label): row.simulation.metrics["rmse"] for row in rows}
     for loop, name, preset in [
         ("exact", "pid-ff", "default"), ("seen", "pid-ff", "hardware"), ("lagged", "pid-ff", "hardware"),
-        ("exact", "smc", "printed"), ("seen", "smc", "hardware"),
+        ("exact", "smc", "hardware"), ("seen", "smc", "hardware"),
     ]:  # fmt: skip
         other = {"default": "hardware", "hardware": "default", "printed": "hardware"}[preset]
         assert rmse[loop, name] == rmse[loop, f"{name}/{preset}"]

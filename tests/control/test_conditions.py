@@ -140,9 +140,9 @@ def test_conditions_of_no_preset_are_refused() -> None:
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if "hardware" in controller(name).presets])
 def test_hardware_gains_bring_an_ideal_wrist_to_its_angle_too(name: str) -> None:
-    """They are those of `simulate`, whose loop has no motors unless it is asked for them."""
-    study = load_study([], [f"simulate.controller={name}"])
-    assert study.simulate.gains == "hardware" and study.simulate.loop.actuator.level == "ideal"
+    """A loop that begins without motors may be given them: the gains for those are no worse for it."""
+    study = load_study([], [f"simulate.controller={name}", "simulate.gains=hardware"])
+    assert study.simulate.loop.actuator.level == "ideal"
     done = simulate(study)
     course = done.first.trajectory
     assert not done.failed.any() and abs(course.error[-1]) < math.radians(0.05)

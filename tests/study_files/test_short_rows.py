@@ -39,7 +39,7 @@ def test_the_place_of_a_controller_is_no_name_with_gains(tmp_path: Path) -> None
     law = tmp_path / "laws" / "mine.py"
     law.write_text("MINE = None\n")
     file = tmp_path / "study.yaml"
-    for name, gains in (("laws/mine.py:MINE", "hardware"), ("laws/mine.py:MINE/soft", "soft")):
+    for name, gains in (("laws/mine.py:MINE", "by-loop"), ("laws/mine.py:MINE/soft", "soft")):
         file.write_text(f"simulate: {{controller: '{name}'}}\n")
         chosen = load_study([file]).simulate
         assert (chosen.controller, chosen.gains) == (f"{law}:MINE", gains)
@@ -103,6 +103,6 @@ def test_values_of_gains_in_a_file_are_for_its_own_controller(tmp_path: Path) ->
     file.write_text("simulate: {controller: ct-dob, gains: {w: 20, zeta: 1, wo: 10}}\n")
     for command in ("simulate", "analyse"):
         other = with_presets(load_study([file], ["controller=pid-ff"], command), command).simulate
-        assert (other.controller, other.gains) == ("pid-ff", "hardware")
+        assert (other.controller, other.gains) == ("pid-ff", "default")
     same = load_study([file], ["controller=pid-ff", "gains={Kp: 1, Ki: 2, Kd: 3}"], "simulate").simulate
     assert same.gains == {"Kp": 1, "Ki": 2, "Kd": 3}

@@ -8,7 +8,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.choices import PLANTS_IN_SPACE, RIGS
-from wristctl.config.controller_row import GAINS, GainsChoice, Row
+from wristctl.config.controller_row import BY_LOOP, GAINS, GainsChoice, Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference, comes_live
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import OneOf, Section, choice, quantity, seldom
@@ -225,7 +225,7 @@ class CalibrateWristSettings(RigSettings):
 class RigRow(Row):
     """One controller with one set of gains, on a rig."""
 
-    gains: GainsChoice = choice("hardware", GAINS)
+    gains: GainsChoice = choice(BY_LOOP, GAINS)
 
 
 class HwRunSettings(RigSettings):

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wristctl.config.controller_row import CONTROLLER, GAINS, ControllerName, GainsChoice
+from wristctl.config.controller_row import BY_LOOP, CONTROLLER, GAINS, ControllerName, GainsChoice
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 
@@ -11,7 +11,7 @@ class SimulateSettings(Section):
     """One closed loop."""
 
     controller: ControllerName = choice("smc", CONTROLLER)
-    gains: GainsChoice = choice("hardware", GAINS)
+    gains: GainsChoice = choice(BY_LOOP, GAINS)
     loop: Loop = Loop()
     reference: Reference = Reference()
     direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")

@@ -31,9 +31,9 @@ def controller(name: str) -> Controller:
 def preset_for(chosen: Controller, exact: bool) -> str:
     """Preset that a controller typed by its name alone has: `default` where all is `exact`, else `hardware`.
 
-    A controller without that preset has `default`, or else its first one; one without presets `default`.
+    A controller without that preset has the other, or else its first one; one without presets `default`.
     """
-    names = ("default",) if exact else ("hardware", "default")
+    names = ("default", "hardware") if exact else ("hardware", "default")
     return next((name for name in names if name in chosen.presets), next(iter(chosen.presets), "default"))
 
 
@@ -43,10 +43,11 @@ def gains_of(
     """Gains by name or by value, in the controller's order; UserError for what is unknown or missing.
 
     A name is a preset's, `tuned`, or `tuned:FAMILY` for the gains that a study found on a family of worlds, or
-    `by-loop` for the preset that is for `loop`. `tuned` holds a tune run's gains by controller and name.
+    `by-loop` for the preset that is for `loop`, or for a rig where there is none. `tuned` holds a tune run's gains by
+    controller and name.
     """
-    if gains == BY_LOOP and loop is not None:
-        gains = preset_for(chosen, loop.is_exact)
+    if gains == BY_LOOP:
+        gains = preset_for(chosen, loop is not None and loop.is_exact)
     if gains == "tuned":
         if tuned is None or chosen.name not in tuned:
             fix = f"--tuned RUN, a tune run that tuned {chosen.name}"

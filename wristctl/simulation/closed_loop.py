@@ -227,7 +227,7 @@ def simulate(
     """
     chosen, draws = study.simulate, Draws(study.seed)
     law = controller(chosen.controller) if learns else in_a_first_repetition(controller(chosen.controller))
-    gains = np.array([gains_of(law, chosen.gains, tuned)])
+    gains = np.array([gains_of(law, chosen.gains, tuned, chosen.loop)])
     wrist, loop, followed = asked_of(study, sample_period(chosen.loop.control_period), network)
     start = equilibrium(loop, followed.planes) if chosen.start == "equilibrium" else None
     scenario = scenario_of(chosen.reference, chosen.direction)

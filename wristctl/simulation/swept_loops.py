@@ -72,7 +72,7 @@ def swept_loops(study: Study) -> list[SweptLoop]:
     times = chosen.repetitions if is_random(loop) else 1
     scenario = scenario_of(chosen.reference, chosen.direction)
     loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
-    at_rest, gains = chosen.start == "equilibrium", gains_of(law, chosen.gains)
+    at_rest, gains = chosen.start == "equilibrium", gains_of(law, chosen.gains, loop=chosen.loop)
     return [
         SweptLoop(law, gains, drawn, wrist, followed, draws.camera(scenario, k), at_rest)
         for k, drawn in enumerate(loops)

@@ -329,9 +329,9 @@ class ExpectedMoves:
         """Raises SafetyStop where a tendon was taut before anything was reeled in.
 
         A wrist that stays bent by `stays` [rad] when nothing pulls has friction of its own, which stretches the tendon
-        by which its taut point is found.
+        by which its taut point is found, and may hold it as far across a plane that alone is seen.
         """
-        if slack >= -self._homing.taut - self._stretch(stays):
+        if slack >= -self._homing.taut - self._stretch(stays) - (self.lever * stays if self._planes == 1 else 0.0):
             return
         likely = f"; likely {rubs}it was not let out" if (rubs := self._rubs(stays)) else ""
         problem = f"tendon {self._numbers[axis]} was taut by {-1e3 * slack:.2f} mm when homing began{likely}"

@@ -143,7 +143,7 @@ def _row(study: Study, inputs: Inputs, planes: int) -> AnalysedRow:
 
     chosen = study.simulate
     law = controller(chosen.controller)
-    gains = dict(zip(law.gains, gains_of(law, chosen.gains, tuned_gains(inputs)), strict=True))
+    gains = dict(zip(law.gains, gains_of(law, chosen.gains, tuned_gains(inputs), chosen.loop), strict=True))
     one_plane = planes == 1
     wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction) if one_plane else (study.wrist, chosen.loop)
     return AnalysedRow(law, gains, loop, wrist, study.analyse.friction)

@@ -124,7 +124,9 @@ def draw(session: Session, study: Study, repeated: Repeated) -> None:
         later("observer", consistency, course, heading=world)
     law = controller(settings.controller)
     if law.surface is not None and not repeated.failed.any():
-        gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
+        gains = dict(
+            zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs), settings.loop), strict=True)
+        )
         caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
         later("sliding", sliding, course, law.surface, gains, caption=caption)
     later("motion", stroboscope, course, study.wrist, plant=settings.loop.plant.model)

@@ -255,7 +255,11 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
         asked: dict[str, Any] = {"tuned": None, "from_identified": None}
         if by_gain or (study.simulate.gains == "tuned" and not _of_several(axes_of(swept, command))):
             law = controller(study.simulate.controller)
-            asked |= {"gains": dict(zip(law.gains, gains_of(law, study.simulate.gains, tuned), strict=True))}
+            asked |= {
+                "gains": dict(
+                    zip(law.gains, gains_of(law, study.simulate.gains, tuned, study.simulate.loop), strict=True)
+                )
+            }
         study = study.model_copy(update={"simulate": study.simulate.model_copy(update=asked)})
     if command == "compare" and tuned:
         rows = tuple(
