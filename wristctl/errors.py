@@ -52,8 +52,8 @@ class Setting:
     """key=value, as it was typed or would be"""
     section: str = ""
     """the command whose section the key is looked for in; load_study wants it in front"""
-    option: bool = False
-    """whether the command has an option of this name: `--source run`"""
+    option: str = ""
+    """the same by an option that the command has: `--source run`"""
     quoted: bool = False
     """whether a shell needs quotes about it"""
 
@@ -61,7 +61,7 @@ class Setting:
     def typed(self) -> str:
         """On the command line."""
         if self.option:
-            return f"--{self.text.replace('=', ' ', 1)}"
+            return self.option
         return f"--set '{self.text}'" if self.quoted else f"--set {self.text}"
 
     @property

@@ -52,6 +52,22 @@ def test_a_group_alone_shows_its_help(call: Call, group: str) -> None:
     assert f"Usage: wristctl {group}" in out + err and "Commands" in out + err
 
 
+@pytest.mark.parametrize(
+    ("typed", "where"),
+    [
+        (["simulate", "--controller", "pdi"], "--controller pdi: simulate.controller"),
+        (["simulate", "--reference", "my file.py:R"], "--reference 'my file.py:R': simulate.reference.kind"),
+        (["hw-run", "--gains", "hardwrae", "--controller", "pid-ff"], "--gains hardwrae: hw-run.controllers.0.gains"),
+        (["simulate", "--sweep", "horizon=1,2", "--sweep", "wrist.lenght=1,2"], "--sweep wrist.lenght=1,2"),
+        (["tune", "--set", "controllers=[pdi]"], "--set controllers=[pdi]: tune.controllers.0"),
+        (["simulate", "--from-identified", "no-run"], "no-run in"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_as_it_was_typed(call: Call, typed: list[str], where: str) -> None:
+    code, _, err = call(*typed)
+    assert code == 2 and f" - {where}" in err and '"' not in err.partition(" - fix: ")[0]
+
+
 def _ends_with(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> None:
     monkeypatch.setattr(app, "get_command", lambda _: lambda **_given: act())
 

@@ -18,7 +18,7 @@ from wristctl.cli.commands import TUNE, Entry
 from wristctl.cli.json_output import Interrupted
 from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
-from wristctl.errors import UserError
+from wristctl.errors import Setting, UserError
 from wristctl.plugins.trust import asking
 from wristctl.study_files.keys import field_at, section_keys, unit_of, whole_key
 from wristctl.study_files.typed_controllers import TAKE_CONTROLLERS, parted
@@ -67,9 +67,9 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
         executor = (procedure.in_units and arguments.pop("executor")) or "serial"
-        typed = {leaf: json.dumps(leaves[leaf]) if leaf in quoted else leaves[leaf] for leaf in leaves}
-        set_ = [f"{leaf}={typed[leaf]}" for leaf in leaves if leaves[leaf] is not None]
-        set_ += [f"sweep={json.dumps(sweeps)}"] if sweeps else []
+        given = {leaf: value for leaf, value in leaves.items() if value is not None}
+        set_ = [_setting(leaf, value, leaf in quoted, leaf == argument) for leaf, value in given.items()]
+        set_ += [_setting("sweep", sweeps, True)] if sweeps else []
         options = Options(**arguments)
         with trusting(options.trust_code):
             _perform(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
@@ -117,8 +117,16 @@ def _option_of(leaf: str) -> str:
     return leaf.partition(".")[0]
 
 
+def _setting(leaf: str, value: Any, quoted: bool, positional: bool = False) -> Setting:
+    """What an option sets, or what stands without a name: its value is data where it is quoted, else YAML."""
+    option = f"--{_option_of(leaf).replace('_', '-')}"
+    values = [option] if isinstance(value, bool) else map(shlex.quote, value if isinstance(value, list) else [value])
+    typed = " ".join(each if positional or each is option else f"{option} {each}" for each in values)
+    return Setting(f"{leaf}={json.dumps(value) if quoted else value}", option=typed)
+
+
 def _perform(
-    procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
+    procedure: Procedure[Any], options: Options, shortcuts: Sequence[Setting], flags: frozenset[str], executor: str
 ) -> None:
     from wristctl.cli.operator import TerminalOperator  # here, where a completion does not wait for them
     from wristctl.cli.output import print_plan, print_result

@@ -60,7 +60,7 @@ def load_study(
 
 def read_study(
     files: Sequence[Path] = (),
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str | Setting] = (),
     command: str | None = None,
     note: bool = True,
     controllers: Sequence[str] = (),
@@ -86,8 +86,8 @@ def read_study(
         _merge_file(data, path, origins, (), former)
     leave_out_removed(data, origins)
     for override in overrides:
-        setting = Setting(override)
-        _merge(data, _today(_override(override, command), setting, None, former), setting, origins)
+        setting = Setting(override) if isinstance(override, str) else override
+        _merge(data, _today(_override(setting, command), setting, None, former), setting, origins)
     for name, value in keywords.items():
         _merge_keyword(data, origins, name, value, command or "", former)
     with_loops_of_today(data, origins, former)
@@ -130,7 +130,7 @@ def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phras
         own = nearest(file, studies_beside(Path(file)))
         return f"did you mean {own!r}?" if own else meant(shipped_name(Path(file)), shipped_names())
     if "controller" in keys:
-        return (f"{file} is a controller: ", Setting(f"controller={file}", option=True))
+        return (f"{file} is a controller: ", Setting(f"controller={file}", option=f"--controller {file}"))
     names = [str(other) for other in files if str(other) in CONTROLLERS]
     if keys_of(field_at((command or "", "controllers", 0))[0]):
         names = [f"{{controller: {name}, gains: {_a_preset(name)}}}" for name in names]
@@ -229,9 +229,8 @@ def _today(document: Document, where: Phrase, file: Path | None, former: NewName
     return Document(placed(_found_from(document.data, folder), file), document.lines)
 
 
-def _override(text: str, command: str | None) -> Document:
-    dotted, equals, value = text.partition("=")
-    where = Setting(text)
+def _override(where: Setting, command: str | None) -> Document:
+    dotted, equals, value = where.text.partition("=")
     if not equals or not dotted:
         raise UserError("an override is key=value", where, ("for example ", Setting("wrist.length=0.09")))
     keys = whole_key(dotted, command).split(".")

@@ -74,7 +74,7 @@ def check_mode(study: Study, command: str | None, origins: Mapping[KeyPath, Phra
         path, what = max(unread, key=len), {"loop": "a loop"}.get(of, of)
         fix = (
             "leave it out, or ",
-            Setting(f"of={other}", "analyse", option=True),
+            Setting(f"of={other}", "analyse", option=f"--of {other}"),
             " (documentation: Hysteresis of the wrist)",
         )
         raise UserError(f"an analysis of {what} does not read {'.'.join(map(str, path))}", origins[path], fix)

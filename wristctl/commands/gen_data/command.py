@@ -64,7 +64,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     settings, wrist = study.gen_data, study.wrist
     for name, present in (("run", "run" in inputs), ("csv", bool(settings.files))):
         if present and settings.source != name:
-            fix, noun = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
+            noun = "a run is" if name == "run" else "files are"
+            fix = Setting(f"source={name}", "gen-data", option=f"--source {name}")
             raise UserError(f"{noun} given, but source is {settings.source}", "gen-data.source", fix)
     if settings.source == "transitions":
         return plan_transitions(study)

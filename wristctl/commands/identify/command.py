@@ -115,7 +115,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Say what will be found from which trials."""
     settings = study.identify
     if settings.model != "hysteresis" and (inner := [name for name in settings.fixed if name.startswith("inner_")]):
-        fix = ("leave it out, or ", Setting("model=hysteresis", "identify", option=True), " for a loop of hysteresis")
+        other = Setting("model=hysteresis", "identify", option="--model hysteresis")
+        fix = ("leave it out, or ", other, " for a loop of hysteresis")
         raise UserError(f"{inner[0]} is no parameter of this model", f"identify.fix.{inner[0]}", fix)
     if settings.logs:
         if inputs.runs():
