@@ -227,6 +227,15 @@ def test_a_users_script_passes_mypy_and_a_wrong_key_in_it_does_not(tmp_path: Pat
     assert faulty == {f"wrong_{number}" for number in range(len(wrong))}, said
 
 
+def test_help_names_every_key_that_a_function_takes() -> None:
+    for name, keys in (
+        ("simulate", {"controller", "loop", "sweep", "wrist"}),
+        ("hw_run", {"payload", "planes", "seed"}),
+    ):
+        told = (getattr(wristctl, name).__doc__ or "").partition("Keys: ")[2].partition(";")[0]
+        assert keys <= set(told.replace("\n", " ").split(", "))
+
+
 def test_the_types_of_arguments_are_those_of_the_schema() -> None:
     script = script_of_docs("argument_types")
     here = ast.dump(ast.parse(script.FILE.read_text(encoding="utf-8")))  # which ruff has laid out

@@ -15,12 +15,15 @@ says what, where and how to mend it.
 
 from __future__ import annotations
 
+import inspect
 import json
 import logging
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wristctl import arguments
 from wristctl.commands.analyse.command import ANALYSE
 from wristctl.commands.analyse.hysteresis_results import Hysteresis
 from wristctl.commands.analyse.results import Analysed
@@ -360,3 +363,15 @@ def open_run(ref: str | Path, out: Folder = RESULTS) -> Run:
     Its `.data(name)`, `.metrics`, `.config`, `.file(name)`. Raises UserError where there is none, or more than one.
     """
     return _open_run(ref, Path(out))
+
+
+def _say_keys(function: Callable[..., Any]) -> None:
+    """Let `help` name the keys that a function takes by `settings`."""
+    title = "".join(map(str.capitalize, function.__name__.split("_"))) + "Arguments"
+    keys = ", ".join(getattr(arguments, title).__annotations__)
+    told = textwrap.fill(f"Keys: {keys}; types and units: wristctl.arguments.{title}.", 110)
+    function.__doc__ = f"{inspect.getdoc(function)}\n\n{told}"
+
+
+for _function in (gen_data, train, tune, compare, recommend, simulate, analyse, identify, hw_run):
+    _say_keys(_function)

@@ -20,7 +20,7 @@ PHRASES: list[tuple[Phrase, str, str]] = [
     (Argument("label", ""), "--label", "label=''"),
     (Argument("runs", "latest:hw-run", positional=True), "latest:hw-run", "runs='latest:hw-run'"),
     (Setting("wrist.length=0.09"), "--set wrist.length=0.09", "load_study(..., 'wrist.length=0.09')"),
-    (Setting("source=run", "gen-data", option="--source run"), "--source run", "load_study(..., 'gen-data.source=run')"),
+    (Setting("of=loop", "analyse", option="--of loop"), "--of loop", "load_study(..., 'analyse.of=loop')"),
     (Call("train"), "wristctl train", "wristctl.train(study)"),
     (Call("gen-data", arguments=(Argument("run", "latest:simulate"),)), "wristctl gen-data --run latest:simulate",
      "wristctl.gen_data(study, run='latest:simulate')"),
