@@ -33,6 +33,7 @@ from wristctl.trial.motion_limit import LEAST, peak_tension
 from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.trials import trials_of
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 
 pytestmark = pytest.mark.slow
@@ -163,15 +164,20 @@ def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
     (pulls,) = figures["tensions"].axes
     assert [line.get_label() for line in pulls.lines] == [f"tendon {number}" for number in ACTIVE]
     space = spatial_view(whole.run)
-    assert space is not None and len(space["tendons"]) == 4 and space["duration"] == pytest.approx(1.2, abs=0.02)
+    assert (
+        space is not None
+        and not space["hinged"]
+        and len(space["tendons"]) == 4
+        and space["duration"] == pytest.approx(1.2, abs=0.02)
+    )
     wanted = np.array(space["wanted"]) * space["units"]["angle"]
     assert np.degrees(np.hypot(*wanted.T)).max() == pytest.approx(8.0, abs=0.1)
     assert animation(whole.run) is None
     assert 'id="space"' in page(whole.run, whole.run.manifest)
 
 
-def test_a_wrist_of_links_is_homed_and_run_and_drawn_as_it_is_seen(whole: Whole, tmp_path: Path) -> None:
-    """Its joints bend more toward the tip; the page, which draws arcs, has those that its estimated bend says."""
+def test_a_wrist_of_links_is_homed_and_run_and_drawn_as_it_is(whole: Whole, tmp_path: Path) -> None:
+    """Its joints bend more toward the tip; the page has them as they truly were, and the tip where they bring it."""
     links = "hw-run.bench.plant={model: hinges, taper: 3.0}"
     study = study_of(links, "hw-run.push.force=0")
     with start_run("hw-run", study, "", tmp_path) as live:
@@ -193,9 +199,15 @@ def test_a_wrist_of_links_is_homed_and_run_and_drawn_as_it_is_seen(whole: Whole,
     assert np.hypot(*simulated[3]) > 1.2 * np.hypot(*simulated[0]), "its simulation is of links too"
     space = spatial_view(run)
     assert space is not None
-    drawn, log = space["units"]["angle"] * np.array(space["bends"]).reshape(-1, 4, 2), run.data("log")
-    assert np.ptp(drawn, axis=1).max() < 2.0 * space["units"]["angle"]
-    assert drawn.sum(axis=1)[0] == pytest.approx(log[[f"bend_{plane}" for plane in PLANES]].iloc[0], abs=1e-3)
+    drawn = space["units"]["angle"] * np.array(space["bends"])
+    assert space["hinged"]
+    within = bent[bent["trial"] == 0]
+    at = np.linspace(within["time"].iloc[0], space["duration"], len(drawn))
+    for column, name in zip(drawn.T, (name for each in names for name in each), strict=True):
+        assert column == pytest.approx(np.interp(at, within["time"], within[name]), abs=1e-3)
+    wrist = run.config.wrist
+    tips = PLANTS_IN_SPACE["hinges"].tips(wrist, drawn)
+    assert space["units"]["place"] * np.array(space["tip"]) == pytest.approx(tips, abs=5e-5)
 
 
 def test_what_homing_has_found_is_kept_by_tendon_and_camera(whole: Whole) -> None:

@@ -18,10 +18,12 @@ from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.plotting.animation import FRAMES, animation
+from wristctl.plotting.page import page
 from wristctl.plotting.style import colour
 from wristctl.records import Run, start_run
 from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.wrist.plant import PLANTS
 
 WRIST = WristParameters()
 Course = Callable[..., Trajectory]
@@ -94,6 +96,27 @@ def test_a_wrist_bent_by_less_than_half_a_turn_has_not_diverged(tmp_path: Path, 
     one = fine(course)
     found = single(tmp_path, replace(one, segment_theta=np.full_like(one.segment_theta, 0.77)))
     assert found is not None and found["courses"][0]["diverged"] is False
+
+
+@pytest.mark.parametrize("plant", ["pcc", "hinges"])
+def test_the_browser_draws_arcs_and_hinged_links_each_to_its_own_tip(
+    tmp_path: Path, course: Course, browser: Any, plant: str
+) -> None:
+    made, study = fine(course), wristctl.load_study(None, f"simulate.loop.plant.model={plant}")
+    with start_run("simulate", study, "", tmp_path, page=lambda path, man, _: page(Run(path), man)) as live:
+        live.table("data/trajectory.csv", made.columns())
+    browser.open(Run(live.path).file("report.html"), 1280, False)
+    seek = "const s = document.getElementById('instant'); s.value = 500; s.dispatchEvent(new Event('input'));"
+    backbone, discs = browser.run(
+        seek + "return ['2.5', '3.5'].map(w => document.querySelector(`#wrists path[stroke-width='${w}']`))"
+        ".map(each => each.getAttribute('d').slice(1).split(/[LM]/).map(at => at.split(' ').map(Number)))"
+    )
+    bent = made.segment_theta[2000]
+    x, y = 1e3 * PLANTS[plant].tips(WRIST, bent[None])[0]
+    assert backbone[0] == [0, 0] and backbone[-1] == pytest.approx([y, -x], abs=0.02)
+    away, there = np.subtract(discs[-1], discs[-2]), bent.sum()
+    assert away / np.hypot(*away) == pytest.approx([np.cos(there), np.sin(there)], abs=1e-3)
+    assert len(discs) == 2 * WRIST.discs and browser.console() == []
 
 
 def rods(loop: Loop) -> Loop:

@@ -25,6 +25,7 @@ from wristctl.records import Run, start_run
 from wristctl.simulation.spatial_references import bend_path
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.trial import trial_results
+from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
 
 PLANES = "simulate.loop.planes=2"
@@ -237,11 +238,14 @@ def points(path: str) -> Array:
     )
 
 
-def test_the_browser_bends_the_wrist_as_the_model_does(browser: Browser, tmp_path: Path) -> None:
-    made = course(4)
-    browser.open(run_of(tmp_path, made, INNER).file("report.html"), 1280, False)
+@pytest.mark.parametrize("plant", ["pcc", "hinges"])
+def test_the_browser_bends_the_wrist_as_the_model_does(browser: Browser, tmp_path: Path, plant: str) -> None:
+    made, model = course(4), PLANTS_IN_SPACE[plant]
+    made = dataclasses.replace(made, tip=model.tips(WristParameters(), made.segment_theta))
+    run = run_of(tmp_path, made, INNER, f"simulate.loop.plant.model={plant}")
+    browser.open(run.file("report.html"), 1280, False)
     browser.run(SEEK.format(1000))
-    _, frames = spatial_frames(made.segment_theta[-1], 0.08, [1.0])
+    _, frames = model.frames(WristParameters(), made.segment_theta[-1], np.array([1.0]))
     x, y, z = frames[0, :, 0]
     bends = np.rad2deg(np.arctan2(np.hypot(y, z), x) * np.array([y, z]) / np.hypot(y, z))
     told = {name: float(number) for number, name in re.findall(r"([\d.]+)° toward (\w+)", browser.run(SAID))}

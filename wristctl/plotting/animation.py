@@ -19,8 +19,8 @@ _PLACES = 1e4
 def animation(run: Run) -> dict[str, Any] | None:
     """Wrist, time step and one course per closed loop of the run, grouped by what it had to follow; None without any.
 
-    A course holds its group, its name, its colour, and per picture the angle of each segment [0.1 mrad] and the wanted
-    angle; pictures end where it diverged. It draws arcs, so that loops of another plant are left out.
+    A course holds its group, its name, its colour, whether its parts are hinged or arcs, and per picture the angle of
+    each [0.1 mrad] and the wanted angle; pictures end where it diverged. Loops of another plant are left out.
     """
     if run.has("data/trajectories.npz"):
         courses, time = _compared(run)
@@ -47,7 +47,11 @@ def animation(run: Run) -> dict[str, Any] | None:
     }
 
 
-Named = tuple[str, str, str, Any, Any]
+# Whether the parts of a plant are rigid links with a hinge, or arcs; what is neither is not drawn.
+HINGED = {"pcc": False, "hinges": True}
+
+Named = tuple[str, str, str, bool, Any, Any]
+"""Group, name, controller, whether it is hinged, angles and wanted ones."""
 
 
 def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
@@ -56,12 +60,13 @@ def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
         return [], series["time"][0]
     bent = series.get("segment_theta", series["theta"][..., None])
     many = table["inverse"].nunique() > 1
-    arcs = {name for name, loop in run.config.compare.loops.items() if loop.plant.model == "pcc"}
+    plants = {name: loop.plant.model for name, loop in run.config.compare.loops.items()}
     courses: list[Named] = []
     for row, angles, wanted in zip(table.to_dict("records"), bent, series["theta_desired"], strict=True):
-        if row["loop"] in arcs:
+        if (plant := plants.get(row["loop"])) in HINGED:
             group = f"{row['loop']}, {row['reference']}" + f", {row['inverse']} inverse" * many
-            courses.append((group, f"{row['controller']}/{row['gains']}", str(row["controller"]), angles, wanted))
+            name, law = f"{row['controller']}/{row['gains']}", str(row["controller"])
+            courses.append((group, name, law, HINGED[plant], angles, wanted))
     return courses, series["time"][0]
 
 
@@ -81,10 +86,10 @@ def _single(run: Run) -> tuple[list[Named], np.ndarray]:
     table = columns_of(run, "trajectory")
     angle_columns = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
     settings = getattr(run.config, run.kind.replace("-", "_"))
-    if settings.loop.plant.model != "pcc":
+    if settings.loop.plant.model not in HINGED:
         return [], table["time"]
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
-    name = ("", f"{settings.controller}/{gains}", settings.controller)
+    name = ("", f"{settings.controller}/{gains}", settings.controller, HINGED[settings.loop.plant.model])
     bent = np.stack([table[column] for column in angle_columns], axis=1)
     return [(*name, bent, table["theta_desired"])], table["time"]
 
@@ -94,8 +99,8 @@ def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
     import numpy as np
 
     trials, log = run.data("trials"), run.data("log")
-    arcs = run.config.hw_run.bench.plant.model == "pcc"
-    truth = run.data("truth") if arcs and run.has("data/truth.csv") else None
+    plant = run.config.hw_run.bench.plant.model
+    truth = run.data("truth") if plant in HINGED and run.has("data/truth.csv") else None
     time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
     courses = []
     for row in trials[trials["outcome"] == "ok"].to_dict("records"):
@@ -107,11 +112,14 @@ def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
         group = row["direction"] + (f", pushed with {row['push']:g} N" if row["push"] else "")
         name = f"{row['controller']}/{row['gains']}"
         again = f", repetition {row['repetition']}" if row["repetition"] else ""
-        courses.append((group, name + again, row["controller"], bent, wanted))
+        hinged = truth is not None and HINGED[plant]
+        courses.append((group, name + again, row["controller"], hinged, bent, wanted))
     return courses, time
 
 
-def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np.ndarray, step: int) -> dict[str, Any]:
+def _course(
+    group: str, name: str, controller: str, hinged: bool, bent: np.ndarray, wanted: np.ndarray, step: int
+) -> dict[str, Any]:  # fmt: skip
     import numpy as np
 
     from wristctl.plotting.style import colour
@@ -123,6 +131,7 @@ def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np
         "group": group,
         "name": name,
         "colour": colour(controller),
+        "hinged": hinged,
         "diverged": not drawable.all(),
         "theta": np.round(_PLACES * shown).astype(int).tolist(),
         "wanted": np.round(_PLACES * wanted[::step]).astype(int).tolist(),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.plotting.animation import columns_of
+from wristctl.plotting.animation import HINGED, columns_of
 from wristctl.plotting.style import (
     BLACK,
     GREEN,
@@ -83,7 +83,7 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     if table_of is None or not run.has(table_of):
         return None
     loop = run.config.hw_run.loop if run.kind == "hw-run" else run.config.simulate.loop
-    if run.kind == "simulate" and loop.plant.model != "pcc":
+    if loop.plant.model not in HINGED:
         return None
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
@@ -115,6 +115,7 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         ],
         "units": {"angle": ANGLE, "place": PLACE, "pull": PULL},
         "from": {"azimuth": AZIMUTH, "elevation": ELEVATION},
+        "hinged": HINGED[loop.plant.model],
         "duration": end,
         "left": not sound.all(),
     } | {

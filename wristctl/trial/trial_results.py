@@ -13,6 +13,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import Loop
+from wristctl.config.plant import Plant
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import in_a_first_repetition
@@ -27,13 +28,14 @@ from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import oscillation, oscillations
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory, size_of
-from wristctl.simulation.worlds import Draws
+from wristctl.simulation.worlds import Draws, plant_of
 from wristctl.trial.log import column_of
 from wristctl.trial.motions import motion_of
 from wristctl.trial.rig_belief import PLANES, layout_of_rig, names_of_planes, places_of_tendons
 from wristctl.trial.rig_settings import as_modelled, share_of_pair
 from wristctl.trial.trials import Trial
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -98,8 +100,8 @@ def logged_course(course: pd.DataFrame, followed: Motion, wrist: WristParameters
     )
 
 
-def true_course(logged: Trajectory, truth: pd.DataFrame, length: float) -> Trajectory:
-    """The same as it truly was on an emulated bench, of a wrist so long [m]; its rate is still the estimated one."""
+def true_course(logged: Trajectory, truth: pd.DataFrame, wrist: WristParameters, plant: Plant) -> Trajectory:
+    """The same as it truly was on an emulated bench; its rate is still the estimated one."""
     time = logged.time
     segments = sum(name.startswith("bend_") and name[5].isdigit() for name in truth.columns) // len(PLANES)
     names = [f"bend_{k + 1}_{plane}" for k in range(segments) for plane in PLANES]
@@ -109,7 +111,7 @@ def true_course(logged: Trajectory, truth: pd.DataFrame, length: float) -> Traje
         theta=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
         acting=_on(time, truth, [name for name in truth.columns if name.startswith("pull_")]),
         segment_theta=bends,
-        tip=spatial_tips(bends, length),
+        tip=PLANTS_IN_SPACE[plant.model].tips(plant_of(wrist, plant), bends),
     )
 
 
@@ -119,7 +121,7 @@ def _on(time: Array, table: pd.DataFrame, names: list[str]) -> Array:
 
 
 def first_course(run: Run) -> Trajectory | None:
-    """The first trial of a run in two planes that went to its end: as it truly was, where that is known of arcs."""
+    """The first trial of a run in two planes that went to its end: as it truly was, where that is known."""
     trials, log = run.data("trials"), run.data("log")
     done = trials[trials["outcome"] == "ok"]
     if done.empty:
@@ -133,10 +135,10 @@ def first_course(run: Run) -> Trajectory | None:
     else:
         followed = motion_of(settings.model_copy(update={"reference": reference}), run.config.wrist, name)
     course = logged_course(rows, followed, run.config.wrist)
-    if not run.has("data/truth.csv") or settings.bench.plant.model != "pcc":
+    if not run.has("data/truth.csv"):
         return course
     truth = run.data("truth")
-    return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)
+    return true_course(course, truth[truth["trial"] == number], run.config.wrist, settings.loop.plant)
 
 
 def _followed_in(log: pd.DataFrame, settings: HwRunSettings, wrist: WristParameters) -> Motion:

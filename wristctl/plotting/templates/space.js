@@ -27,18 +27,26 @@
     const half = Math.hypot(y, z) / 2, s = sinc(half);
     return [arc * s * Math.cos(half), arc * s * s * y / 2, arc * s * s * z / 2];
   }
+  // From the base of a part to a share of it: along an arc, or along rigid links with a hinge between them.
+  function within(q, share, arc) {
+    if (!motion.hinged) {
+      const u = q.map(bend => share * bend);
+      return [chord(u, share * arc), turned(u)];
+    }
+    const frame = turned(share > 0.5 ? q : [0, 0]);
+    return [add([Math.min(share, 0.5) * arc, 0, 0], column(frame, 0), Math.max(share - 0.5, 0) * arc), frame];
+  }
   // Centre and frame of a wrist's cross-sections, so many spans from base to tip.
   function sections(q, spans) {
-    const n = q.length / 2, arc = length / n, found = [];
-    let place = [0, 0, 0], frame = [[1, 0, 0], [0, 1, 0], [0, 0, 1]], k = 0;
+    const n = q.length / 2, found = [];
+    let base = { centre: [0, 0, 0], frame: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }, k = 0;
+    const at = share => {
+      const [ahead, turn] = within([q[2 * k], q[2 * k + 1]], share, length / n);
+      return { centre: add(base.centre, times(base.frame, ahead)), frame: product(base.frame, turn) };
+    };
     for (let i = 0; i <= spans; i++) {
-      while (k < n - 1 && i / spans * n >= k + 1) {
-        place = add(place, times(frame, chord([q[2 * k], q[2 * k + 1]], arc)));
-        frame = product(frame, turned([q[2 * k], q[2 * k + 1]]));
-        k++;
-      }
-      const share = i / spans * n - k, u = [share * q[2 * k], share * q[2 * k + 1]];
-      found.push({ centre: add(place, times(frame, chord(u, share * arc))), frame: product(frame, turned(u)) });
+      for (; k < n - 1 && i / spans * n >= k + 1; k++) base = at(1);
+      found.push(at(i / spans * n - k));
     }
     return found;
   }

@@ -13,19 +13,23 @@
     return made;
   };
 
-  // Points, with their directions, at equal arc lengths of a chain of arcs.
-  function frames(theta, pieces) {
-    const found = [], fine = 8;
-    let x = 0, y = 0, heading = 0;
+  // Along an arc that bends by an angle.
+  function ahead([x, y, heading], arc, bend) {
+    const half = bend / 2, chord = Math.abs(half) < 1e-6 ? arc : arc * Math.sin(half) / half;
+    return [x + chord * Math.cos(heading + half), y + chord * Math.sin(heading + half), heading + bend];
+  }
+  // Points, with their directions, at equal lengths of a chain of arcs, or of parts with a hinge in the middle.
+  function frames(theta, pieces, hinged) {
+    const found = [], n = theta.length, size = length / n;
+    const within = (base, bend, share) => {
+      if (!hinged) return ahead(base, share * size, share * bend);
+      const [x, y, heading] = ahead(base, Math.min(share, 0.5) * size, 0);
+      return share > 0.5 ? ahead([x, y, heading + bend], (share - 0.5) * size, 0) : [x, y, heading];
+    };
+    let base = [0, 0, 0], part = 0;
     for (let k = 0; k <= pieces; k++) {
-      found.push([x, y, heading]);
-      for (let j = 0; j < fine; j++) {
-        const along = (k + j / fine) / pieces * theta.length;
-        const bend = theta[Math.min(theta.length - 1, Math.floor(along + 1e-9))] * theta.length / (pieces * fine);
-        x += length / (pieces * fine) * Math.cos(heading + bend / 2);
-        y += length / (pieces * fine) * Math.sin(heading + bend / 2);
-        heading += bend;
-      }
+      for (; part < n - 1 && k / pieces * n >= part + 1 - 1e-9; part++) base = within(base, theta[part], 1);
+      found.push(within(base, theta[part], k / pieces * n - part));
     }
     return found;
   }
@@ -76,12 +80,12 @@
     return time => {
       const ended = course.diverged && time > (course.theta.length - 1) * step;
       const theta = course.theta.length ? at(course.theta, time) : [0], wanted = at(course.wanted, time);
-      const bent = frames(theta, 4 * (wrist.discs - 1)), plates = bent.filter((_, k) => k % 4 === 0), tip = bent.at(-1);
+      const bent = frames(theta, 4 * (wrist.discs - 1), course.hinged), plates = bent.filter((_, k) => k % 4 === 0), tip = bent.at(-1);
       shapes.backbone.setAttribute("d", line(bent.map(frame => spot(frame, 0))));
       shapes.discs.setAttribute("d", plates.map(frame => line([spot(frame, -rim), spot(frame, rim)])).join(""));
       shapes.tendons.setAttribute("d", [-1, 1].map(side => line(plates.map(frame => spot(frame, side * 1e3 * wrist.offset)))).join(""));
       shapes.hand.setAttribute("d", line([spot(tip, 0, 0.8 * rim), spot(tip, 0, Math.max(0.8 * rim, 2e3 * wrist.hand - 0.8 * rim))]));
-      const goal = frames([wanted], 16);
+      const goal = frames([wanted], 16, false);
       shapes.wanted.setAttribute("d", line([...goal.map(frame => spot(frame, 0)), spot(goal.at(-1), 0, 2e3 * wrist.hand)]));
       cursor.setAttribute("d", `M${across(time / step)} 0V${HIGH}`);
       const degrees = theta.reduce((a, b) => a + b, 0) * 180 / Math.PI;
