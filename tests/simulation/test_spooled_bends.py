@@ -53,6 +53,15 @@ def line() -> Array:
     return bends
 
 
+def test_a_zero_that_is_wrong_is_each_cameras_and_is_not_seen() -> None:
+    """The wrist rests off by it in either plane, as far as the spools let the controller."""
+    sound, wrong = (
+        followed(np.zeros((2, 3, len(TIME))), real(plant={"sensor": {"zero_deg": zero}})) for zero in (0.0, 1.0)
+    )
+    assert np.rad2deg(np.asarray(wrong.seen)[-1] - wrong.bend[-1]) == pytest.approx([1.0, 1.0], abs=0.05)
+    assert (np.rad2deg(sound.bend[-1] - wrong.bend[-1]) > 0.1).all()
+
+
 @pytest.mark.parametrize("side", [0, 1])
 def test_camera_motors_and_rubbing_tendons_are_those_of_one_plane(side: int) -> None:
     path = np.zeros((2, 3, len(TIME)))

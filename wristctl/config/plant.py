@@ -163,7 +163,7 @@ class TrueSensor(Overrides):
     noise_deg: NotNegative = truth("deg", "standard deviation of the angle")
     dropped: NotNegative = truth("", "share of frames without a result")
     burst: float = fact(1.0, "", "frames that are lost in a row, on average; 1: each by itself", ge=1)
-    zero_deg: float = fact(0.0, "deg", "angle that the camera shows of a straight wrist")
+    zero_deg: float = fact(0.0, "deg", "angle that each camera shows of a straight wrist")
     dated_late: float = fact(0.0, "s", "by how much later than they are taken pictures are dated; negative: earlier")
 
 

@@ -39,10 +39,11 @@ def cameras_of(
     bursts = [worlds[index].loop.plant.sensor.burst for index in which]
     counts, cameras = frame_counts(sensors, horizon)[which].tolist(), [sensors[index] for index in which]
     taken = readings(counts, cameras, streams, bursts)
-    taken[:, :, 0] += np.deg2rad([worlds[index].loop.plant.sensor.zero_deg for index in which])[:, None]
     for plane in range(1, planes):  # each sees with noise of its own, and all a frame or none
         more = readings(counts, cameras, [(*stream, plane) for stream in streams], bursts)
         taken = np.insert(taken, plane, more[:, :, 0], axis=2)
+    zeros = [worlds[index].loop.plant.sensor.zero_deg for index in which]
+    taken[:, :, :planes] += np.deg2rad(zeros)[:, None, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
     by_block = np.array(
