@@ -99,6 +99,19 @@ def test_no_batch_is_run_before_all_but_the_last_are_judged(monkeypatch: pytest.
     assert seen.count("run") == seen.count("judged") == 5
 
 
+@pytest.mark.parametrize("given", ["", "simulate.gains=by-loop"])
+def test_controllers_and_loops_that_are_swept_have_each_the_gains_that_simulate_gives_them(given: str) -> None:
+    sweep = "sweep=['controller=smc,pid-ff,pid', 'loop.actuator.level=ideal,tendon']"
+    study = wristctl.load_study(None, sweep, *([given] if given else []))
+    swept: Any = wristctl.simulate(study)
+    for row in swept.frame().to_dict("records"):
+        controller, level = row["simulate.controller"], row["simulate.loop.actuator.level"]
+        alone = wristctl.simulate(controller=controller, loop={"actuator": {"level": level}})
+        assert row["rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-9), (controller, level)
+    told = "Gains by loop: smc/hardware, pid-ff/default, pid-ff/hardware, pid/printed."
+    assert told in " ".join(swept.answer.lines())
+
+
 def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:
     study = wristctl.load_study(None, *FAST)
     table = wristctl.simulate(swept(study, "simulate.gains.Kp=2,8")).frame()
@@ -249,10 +262,10 @@ def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_pat
 
 @pytest.mark.parametrize("typed", [(), ("simulate.gains=hardware",)])
 def test_a_controller_without_the_given_preset_is_swept_with_its_own(typed: tuple[str, ...]) -> None:
-    """Of two that are swept one has gains `hardware`, typed or not; the other's are as when it is simulated alone."""
+    """Gains that are typed hold for those that have them; the others' are as when each is simulated alone."""
     both = "sweep=['simulate.controller=ct-dob,computed-torque']"  # none of which is the study's own
     rows = wristctl.simulate(wristctl.load_study(None, *typed, both)).frame().set_index("simulate.controller")
-    for chosen in (("ct-dob", "hardware"), ("computed-torque", "default")):
+    for chosen in (("ct-dob", "hardware" if typed else "default"), ("computed-torque", "default")):
         keys = (f"simulate.{key}={value}" for key, value in zip(("controller", "gains"), chosen, strict=True))
         alone = wristctl.simulate(wristctl.load_study(None, *keys))
         assert rows.loc[chosen[0], "rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-12)

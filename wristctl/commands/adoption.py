@@ -143,8 +143,10 @@ def with_presets(study: Study, command: str, tell: bool = True, for_several: boo
 
     That is its preset `default`, or else its first, for the commands of one loop, for `compare` and for `hw-run`. With
     `tell` the log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
-    Gains by loop are the preset of all loops, where these have the same one.
+    Gains by loop are the preset of all loops, where these have the same one; of a sweep each point has its own.
     """
+    if study.sweep:
+        return study
     if command in ("simulate", "analyse") and "simulate" in names_read(command, study):
         row = _with_preset(_by_loop(study.simulate, [study.simulate.loop], tell), tell, for_several)
         return study.model_copy(update={"simulate": row})

@@ -63,17 +63,20 @@ def headline(table: pd.DataFrame, metrics: Sequence[Quantity]) -> list[Quantity]
 
 
 def answer(
-    command: str, table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Quantity], run: str = ""
-) -> Answer:
+    command: str, table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Quantity], run: str = "",
+    presets: Sequence[str] = (),
+) -> Answer:  # fmt: skip
     """The answer of a sweep for one screen: of its `table` in SI units, what was swept, and the metrics to show.
 
-    The first metric is the main one; `run` is the path, empty for a result in memory.
+    The first metric is the main one; `run` is the path, empty for a result in memory. `presets` are the controllers
+    with the gains that they have by their loops, where nobody chose any.
     """
     chosen = _some(table, [key.name for key in keys])
     where = f"{run}/data/sweep.csv" if run else "`.frame()`"
     more = f"{len(chosen)} of {len(table)} rows; all of them: {where}." if len(chosen) < len(table) else ""
     shown = rows_of(chosen, keys, metrics).within(COLUMNS)
-    return Answer(sentence(command, table, keys, metrics), shown, more=more)
+    notes = [f"Gains by loop: {', '.join(presets)}."] if presets else []
+    return Answer(sentence(command, table, keys, metrics), shown, notes, more=more)
 
 
 def rows_of(table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Quantity]) -> Table:

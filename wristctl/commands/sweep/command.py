@@ -29,6 +29,7 @@ from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session, Unattended
 from wristctl.commands.sweep.answer import answer, fates, headline, metrics_of, quantities, rows_of
 from wristctl.commands.units import performed
+from wristctl.config.controller_row import BY_LOOP
 from wristctl.config.loop import LOOPS
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
@@ -328,8 +329,24 @@ def _swept(session: Session, command: str) -> Swept:
         for key in keys:
             others = [other for other in keys if other is not key]
             findings.figure(f"sweep-{key.name}", over_setting, table, key, others, shown)
-    screen = answer(command, table, keys, shown, str(findings.run.path) if findings.run else "")
+    screen = answer(
+        command,
+        table,
+        keys,
+        shown,
+        str(findings.run.path) if findings.run else "",
+        _presets(base, command, axes, points),
+    )
     return Swept(study, findings, [rows_of(table.head(_PRINTED), keys, shown)], table, outcome.poisoned, screen)
+
+
+def _presets(base: Study, command: str, axes: Sequence[SweepAxis], points: Sequence[Sequence[Any]]) -> list[str]:
+    """Controllers with their gains by loop, of points unlike by names; none where gains were chosen."""
+    if command != "simulate" or base.simulate.gains != BY_LOOP:
+        return []
+    unlike = {tuple(value for value in point if isinstance(value, str)): point for point in points}
+    rows = [_at(base, axes, point, "simulate", None).simulate for point in [*unlike.values()][:_CHECKED]]
+    return list(dict.fromkeys(f"{row.controller}/{row.gains}" for row in rows))
 
 
 def _golden(study: Study, command: str) -> Golden:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from wristctl.commands.quantities import Quantity
-from wristctl.commands.sweep.answer import FAILED, fates, least, measurable
+from wristctl.commands.sweep.answer import FAILED, fates, least
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -68,7 +68,7 @@ def over_setting(
     lines = _lines(table, other_keys)
     panels = [panel for row in axes.tolist() for panel in row]
     for panel, metric in zip(panels, metrics, strict=False):
-        heights = np.where(failed, np.nan, metric.cell(measurable(table[metric.name], metric)))
+        heights = np.where(failed, np.nan, metric.cell(table[metric.name].to_numpy(float)))
         for (label, chosen), hue in zip(lines, _HUES, strict=False):
             panel.plot(places[chosen], heights[chosen], ".", color=hue, label=label, **_DOT)
             if labels is None:
