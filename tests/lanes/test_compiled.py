@@ -8,6 +8,8 @@ import importlib.util
 import os
 import subprocess
 import sys
+import threading
+import time
 import warnings
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +17,7 @@ from typing import Any, TypeGuard
 
 import numba
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import wristctl
 from wristctl.lanes import compiled as module
@@ -131,6 +134,33 @@ def test_of_processes_that_need_the_same_at_once_one_compiles_and_the_others_tak
         each.stdin.write("go\n")
         each.stdin.flush()
     assert sorted(each.communicate(timeout=100)[0].split() for each in several) == [["0", "1"], ["1", "0"], ["1", "0"]]
+
+
+def test_signatures_that_are_kept_at_once_each_have_a_file_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by several processes: between one's look at the index and its file another looks too."""
+    read = IndexDataCacheFile._load_index
+    together = threading.Barrier(4)
+
+    def slowly(self: Any) -> Any:
+        known = read(self)
+        time.sleep(0.02)
+        return known
+
+    def keep_one(key: int) -> None:
+        together.wait(timeout=30.0)
+        module._Index(str(tmp_path), "loop", "stamp").save(key, f"code of {key}")
+
+    with monkeypatch.context() as slow:
+        slow.setattr(IndexDataCacheFile, "_load_index", slowly)
+        several = [threading.Thread(target=keep_one, args=(key,)) for key in range(4)]
+        for each in several:
+            each.start()
+        for each in several:
+            each.join()
+    kept = module._Index(str(tmp_path), "loop", "stamp")
+    assert [kept.load(key) for key in range(5)] == [*(f"code of {key}" for key in range(4)), None]
 
 
 def test_a_process_that_never_ends_compiling_is_not_waited_for(

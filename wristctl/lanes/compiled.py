@@ -25,7 +25,7 @@ from typing import Any, NoReturn, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
@@ -188,6 +188,20 @@ class _Kept(FunctionCache):
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._impl_class = partial(_KeptFiles, folder=folder)
         super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _Index(str(folder), self._impl.filename_base, stamp)
+
+
+class _Index(IndexDataCacheFile):
+    """numba's index of what is kept of one function: a file for each signature, which it numbers.
+
+    Of processes that keep two signatures at once each has a number of its own: numba lets them write one file, and runs
+    the one's code with the other's arguments (numba issue 4807).
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        with _alone(Path(f"{self._index_path}.lock")):
+            super().save(key, data)
 
 
 class _KeptFiles(CompileResultCacheImpl):
