@@ -71,7 +71,28 @@ def test_the_wrist_is_that_of_the_run(tmp_path: Path, course: Course) -> None:
     found = single(tmp_path, fine(course), study)
     assert found is not None
     offset = pytest.approx(0.03 / np.sqrt(2.0))
-    assert found["wrist"] == {"length": 0.1, "discs": 4, "offset": offset, "radius": 0.03, "hand": 0.05}
+    sizes = {"length": 0.1, "discs": 4, "offset": offset, "radius": 0.03, "hand": 0.05}
+    assert found["wrist"] == sizes | {"gravity": -9.81}
+
+
+@pytest.mark.parametrize(
+    ("gravity", "down"),
+    [("gravity=[-9.81, 0]", 1), ("gravity=[9.81, 0]", -1), ("gravity=[0, 9.81]", 0), ("gravity_flexion=1", 0)],
+)
+def test_gravity_is_shown_where_it_is_along_the_straight_wrist(
+    tmp_path: Path, course: Course, browser: Any, gravity: str, down: int
+) -> None:
+    study = wristctl.load_study(None, f"wrist.{gravity}")
+    with start_run("simulate", study, "", tmp_path, page=lambda path, man, _: page(Run(path), man)) as live:
+        live.table("data/trajectory.csv", fine(course).columns())
+    browser.open(Run(live.path).file("report.html"), 1280, False)
+    told = browser.run("return [...document.querySelectorAll('#wrists text')].map(each => each.textContent)")
+    assert told == ["gravity"] * abs(down) and browser.console() == []
+    arrows = browser.run(
+        "return [...document.querySelectorAll(`#wrists path[stroke-width='1'][stroke-linecap='round']`)]"
+        ".map(each => each.getAttribute('d').match(/-?[\\d.]+/g).map(Number))"
+    )
+    assert [np.sign(tip - begin) for _, begin, _, tip, *_ in arrows] == [down] * abs(down)
 
 
 def test_a_log_coarser_than_the_pictures_is_played_as_it_is(tmp_path: Path, course: Course) -> None:

@@ -315,6 +315,22 @@ def test_the_view_fits_the_page(browser: Browser, tmp_path: Path, width: int) ->
     assert stage > 0.4 * width and 10.0 < letters < 24.0
 
 
+@pytest.mark.parametrize(("gravity", "up"), [("[9.81, 0]", True), ("[-9.81, 0]", False)])
+def test_gravity_is_shown_as_it_pulls_on_the_page_and_in_the_figure(
+    browser: Browser, tmp_path: Path, gravity: str, up: bool
+) -> None:
+    run = run_of(tmp_path, course(), f"wrist.gravity={gravity}")
+    browser.open(run.file("report.html"), 1280, False)
+    arrow = "return document.querySelector(`#stage path[stroke-width='1.2']`).getAttribute('d')"
+    begin, end = points(browser.run(arrow).split("M")[1])
+    assert (end[1] < begin[1]) == up and begin[0] == pytest.approx(end[0])
+    pulled = motion_in_space(course(), run.config.wrist).axes[0].texts
+    drawn = next(text for text in pulled if text.arrow_patch is not None)  # type: ignore[attr-defined]
+    assert (drawn.xy[1] > drawn.xyann[1]) == up  # type: ignore[attr-defined]
+    still = run.config.wrist.model_copy(update={"gravity": (0.0, 0.0)})
+    assert "gravity" not in [text.get_text() for text in motion_in_space(course(), still).axes[0].texts]
+
+
 def test_the_figures_view_turns_space_and_neither_stretches_nor_mirrors_it() -> None:
     """From above and from the side: the straight wrist stands upright, and its far end is the nearer one."""
     right, up, away = seen(np.eye(3)).T

@@ -20,7 +20,8 @@ def animation(run: Run) -> dict[str, Any] | None:
     """Wrist, time step and one course per closed loop of the run, grouped by what it had to follow; None without any.
 
     A course holds its group, its name, its colour, whether its parts are hinged or arcs, and per picture the angle of
-    each [0.1 mrad] and the wanted angle; pictures end where it diverged. Loops of another plant are left out.
+    each [0.1 mrad] and the wanted angle; pictures end where it diverged. Loops of another plant are left out. Gravity
+    is that along the straight wrist, and 0 where it has another part, which planes see differently.
     """
     if run.has("data/trajectories.npz"):
         courses, time = _compared(run)
@@ -40,6 +41,7 @@ def animation(run: Run) -> dict[str, Any] | None:
             "offset": wrist.tendon_offset,
             "radius": wrist.tendon_radius,
             "hand": wrist.hand_offset,
+            "gravity": 0.0 if any((wrist.gravity[1], wrist.gravity_flexion)) else wrist.gravity[0],
         },
         "step": float(time[step] - time[0]),
         "duration": float(time[-1] - time[0]),

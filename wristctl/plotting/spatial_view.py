@@ -114,6 +114,7 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
             for k, (cable, number) in enumerate(zip(places, _numbers(run, len(places)), strict=True))
         ],
         "units": {"angle": ANGLE, "place": PLACE, "pull": PULL},
+        "gravity": [*wrist.gravity, wrist.gravity_flexion],
         "from": {"azimuth": AZIMUTH, "elevation": ELEVATION},
         "hinged": HINGED[loop.plant.model],
         "duration": end,
@@ -172,6 +173,7 @@ def motion_in_space(course: Trajectory, wrist: WristParameters, heading: str = "
         right.plot(1e3 * path[:, 1], 1e3 * path[:, 2], **style)
     _line(left, course.tip[largest, None], zorder=5.0, **_HERE)
     right.plot(1e3 * course.tip[largest, 1], 1e3 * course.tip[largest, 2], **_HERE)
+    _draw_gravity(left, wrist)
     undress(left)
     left.set(xticks=[], yticks=[], aspect="equal")
     right.set_aspect("equal", adjustable="datalim")  # a box as flat as a straight path would have no height
@@ -189,6 +191,19 @@ _HERE: dict[str, Any] = {"color": GREEN, "marker": "o", "markersize": 5.0, "line
 
 def _line(axes: Axes, points: Array, **style: Any) -> None:
     axes.plot(*(1e3 * seen(points)[:, :2].T), **style)
+
+
+def _draw_gravity(axes: Axes, wrist: WristParameters) -> None:
+    """Where gravity pulls, in a corner."""
+    pull = np.array([*wrist.gravity, wrist.gravity_flexion])
+    if not pull.any():
+        return
+    right, up, _ = 28.0 * seen(pull / np.linalg.norm(pull))
+    arrow = {"arrowstyle": "->", "color": GREY}
+    from_, to = (30.0 - 0.5 * right, 244.0 - 0.5 * up), (30.0 + 0.5 * right, 244.0 + 0.5 * up)
+    corner: Any = "figure points"
+    axes.annotate("", to, from_, xycoords=corner, textcoords=corner, arrowprops=arrow)
+    axes.annotate("gravity", (30.0, 214.0), xycoords=corner, ha="center", fontsize=9.0, color=GREY)
 
 
 def _draw_floor(axes: Axes, radius: float) -> None:

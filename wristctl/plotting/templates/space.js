@@ -109,6 +109,22 @@
     text.textContent = name;
     return [text, y, z];
   });
+  const pulled = motion.gravity.some(Boolean) ? motion.gravity.map(each => each / Math.hypot(...motion.gravity)) : null;
+  const weight = element(svg, "path", { fill: "none", stroke: GREY, "stroke-width": 1.2, "stroke-linecap": "round" });
+  const weightName = element(texts, "text", { x: -0.86 * wide, y: 0.92 * high, "text-anchor": "middle" });
+  weightName.textContent = pulled ? "gravity" : "";
+
+  // In a corner, as it is looked at; where it points at the reader or away its head alone.
+  function ofGravity() {
+    const [x, y, z] = pulled, long = 0.16 * high, size = 0.045 * high;
+    const behind = z * Math.cos(azimuth) - y * Math.sin(azimuth);
+    const to = [y * Math.cos(azimuth) + z * Math.sin(azimuth), -(x * Math.cos(elevation) + behind * Math.sin(elevation))];
+    const [right, down] = to, shown = Math.hypot(right, down) || 1, cx = -0.86 * wide, cy = 0.72 * high;
+    const end = [cx + long / 2 * right, cy + long / 2 * down], ahead = [right / shown, down / shown];
+    const wing = side => [end[0] - size * (ahead[0] - side * ahead[1]), end[1] - size * (ahead[1] + side * ahead[0])];
+    return line([[cx - long / 2 * right, cy - long / 2 * down], end]) + line([wing(0.6), end, wing(-0.6)]);
+  }
+
   const entry = (style, words) => {
     const item = keys.appendChild(document.createElement("li")), mark = item.appendChild(document.createElement("i")), text = item.appendChild(document.createElement("span"));
     mark.style.borderTop = style;
@@ -209,6 +225,7 @@
       const shown = Math.hypot(right, down - lowest) > 0.4 * ground ? "visible" : "hidden";  // else it points at the reader
       for (const [name, value] of Object.entries({ x: right, y: down, "text-anchor": anchor, visibility: shown })) text.setAttribute(name, value);
     }
+    if (pulled) weight.setAttribute("d", ofGravity());
     tell(end, goal, tip, wantedTip, pull, place);
   }
 

@@ -59,6 +59,13 @@
       backbone: part({ stroke: course.colour, "stroke-width": 2.5 }),
       discs: part({ stroke: "#000", "stroke-width": 3.5, "stroke-linecap": "round" }),
     };
+    if (wrist.gravity) {
+      const ahead = -Math.sign(wrist.gravity) * 0.09 * reach, x = -0.84 * half, y = -0.86 * reach, tip = y + ahead;
+      const head = [-1, 1].map(side => `M${x} ${tip}L${x + side * 0.03 * reach} ${tip - 0.4 * ahead}`).join("");
+      part({ stroke: GREY, "stroke-width": 1, "stroke-linecap": "round", d: `M${x} ${y - ahead}L${x} ${tip}${head}` });
+      const name = svg.appendChild(element("text", { x, y: -0.68 * reach, fill: GREY, "font-size": 0.07 * reach, "text-anchor": "middle" }));
+      name.textContent = "gravity";
+    }
     const sums = course.theta.map(angles => angles.reduce((a, b) => a + b, 0));
     const all = [...course.wanted, ...course.wanted.map(angle => 1.5 * angle), 0];
     const low = Math.min(...all), high = Math.max(...all, low + 1);
