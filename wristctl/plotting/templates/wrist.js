@@ -60,7 +60,7 @@
       discs: part({ stroke: "#000", "stroke-width": 3.5, "stroke-linecap": "round" }),
     };
     if (wrist.gravity) {
-      const ahead = -Math.sign(wrist.gravity) * 0.09 * reach, x = -0.84 * half, y = -0.86 * reach, tip = y + ahead;
+      const ahead = -Math.sign(wrist.gravity) * 0.09 * reach, x = -0.8 * half, y = -0.86 * reach, tip = y + ahead;
       const head = [-1, 1].map(side => `M${x} ${tip}L${x + side * 0.03 * reach} ${tip - 0.4 * ahead}`).join("");
       part({ stroke: GREY, "stroke-width": 1, "stroke-linecap": "round", d: `M${x} ${y - ahead}L${x} ${tip}${head}` });
       const name = svg.appendChild(element("text", { x, y: -0.68 * reach, fill: GREY, "font-size": 0.07 * reach, "text-anchor": "middle" }));
