@@ -56,7 +56,7 @@ _CONTROLLERS = {
     "fopi": ("#d6604d", "fractional PI"),
     "ilc": ("#dfc27d", "iterative learning"),
     "pd-ff": ("#9970ab", "PD, feedforward"),
-    "pid-ff": ("#5aae61", "PID, feedforward"),
+    "pid-ff": ("#a020c8", "PID, feedforward"),
     "pid-dob": ("#4575b4", "PID, observer"),
     "smc-dob": ("#762a83", "sliding mode, observer"),
 }
