@@ -127,8 +127,15 @@ def step(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
     return fig
 
 
+# Times the frequencies of most poles beyond which the highest ones are drawn closer together.
+_FAR = 20.0
+
+
 def locus(root_locus: RootLocus, least_growth: float = -60.0) -> Figure:
-    """Poles as the gain grows: decay or growth [1/s] and frequency [Hz]; black rings stand for the loop as it is."""
+    """Poles as the gain grows: decay or growth [1/s] and frequency [Hz]; black rings stand for the loop as it is.
+
+    Where a pole that turns over at every tick lies far above the others, high frequencies are drawn closer together.
+    """
     fig, ((axes,),) = figure(height=4.2)
     points = np.concatenate([poles for poles in root_locus.poles if len(poles)])
     shades = np.concatenate([np.full(len(p), f) for f, p in zip(root_locus.factors, root_locus.poles, strict=True)])
@@ -141,13 +148,16 @@ def locus(root_locus: RootLocus, least_growth: float = -60.0) -> Figure:
     right = max(5.0, min(float(points[:, 0].max()), -left)) if len(points) else 5.0
     axes.set_xlim(1.05 * left, 1.05 * right)
     inside = points[(points[:, 0] > 1.05 * left) & (points[:, 0] < 1.05 * right)]
-    axes.set_ylim(-0.02 * inside[:, 1].max(initial=1.0), 1.05 * inside[:, 1].max(initial=1.0))
+    highest, usual = inside[:, 1].max(initial=1.0), np.quantile(inside[:, 1], 0.9) if len(inside) else 1.0
+    if highest > _FAR * usual:
+        axes.set_yscale("asinh", linear_width=max(float(usual), 1.0))
+    axes.set_ylim(-0.02 * highest if highest <= _FAR * usual else -0.2 * max(usual, 1.0), 1.05 * highest)
     axes.set(xlabel="growth [1/s]; left of 0 it decays", ylabel="frequency [Hz]")
     bar = fig.colorbar(shown, ax=axes, label="log10 of the gain's factor")
     bar.ax.tick_params(labelsize=9.0)
     over = "the loop's gain" if root_locus.over == "loop" else root_locus.over
     title(axes, f"Root locus over {over}")
-    legend(axes, loc="upper left")
+    legend_below(fig)
     return fig
 
 
