@@ -218,6 +218,7 @@ class TuneArguments(SharedArguments, total=False):
     loops: Mapping[str, LoopKeys]
     horizon: float  # s
     repetitions: int
+    kept: Sequence[str]
     resume: str | None
     families: Mapping[str, Mapping[str, Any]]
     controller_settings: Mapping[str, Mapping[str, float]]
@@ -235,6 +236,7 @@ class CompareArguments(SharedArguments, total=False):
     worlds: Mapping[str, Any]
     horizon: float  # s
     repetitions: int
+    kept: Sequence[str]
     tuning: Mapping[str, Any] | None
     families: Mapping[str, Mapping[str, Any]]
     controller_settings: Mapping[str, Mapping[str, float]]
@@ -260,6 +262,7 @@ class RecommendArguments(SharedArguments, total=False):
     payloads: Sequence[float]  # kg
     rehearsed: int
     rig: str | None
+    kept: Sequence[str]
     controller_settings: Mapping[str, Mapping[str, float]]
 
 
@@ -274,6 +277,7 @@ class SimulateArguments(SharedArguments, total=False):
     start: Literal["straight", "equilibrium"]
     horizon: float  # s
     repetitions: int
+    kept: Sequence[str]
     controller_settings: Mapping[str, Mapping[str, float]]
     sweep: Sequence[str]
 
@@ -289,6 +293,7 @@ class AnalyseArguments(SharedArguments, total=False):
     start: Literal["straight", "equilibrium"]
     horizon: float  # s
     repetitions: int
+    kept: Sequence[str]
     of: Literal["loop", "hysteresis"]
     angles_deg: Sequence[float]  # deg
     over: str
@@ -368,5 +373,6 @@ class HwRunArguments(SharedArguments, total=False):
     rest: float  # s
     control_period: float  # s
     positions: Literal["find", "stored"]
+    kept: Sequence[str]
     video: bool
     controller_settings: Mapping[str, Mapping[str, float]]

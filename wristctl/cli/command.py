@@ -144,7 +144,7 @@ def _perform(
         check_sizes(study, origins)
     with listening(options.quiet, options.verbose) as console:
         try:
-            prepared = prepare(procedure, study, options.out, files=files)
+            prepared = prepare(procedure, study, options.out, files=files, origins=origins)
             plan = prepared.plan()
             if procedure.doubts and not options.force:
                 procedure.doubts(prepared.study, prepared.inputs)

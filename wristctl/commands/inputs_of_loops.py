@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -315,6 +315,10 @@ class Found:
     ratios: Mapping[str, Any] | None = None
     said: bool = False
     """Whether a person has been told which settings are whose."""
+    wrist: WristParameters | None = None
+    """The settings by which a log was fitted; None of trials, whose runs have their own."""
+    taken: Sequence[str] = ()
+    """Settings that the study has from these."""
 
 
 def with_found(study: Study, command: str, found: Found) -> Study:
@@ -325,9 +329,12 @@ def with_found(study: Study, command: str, found: Found) -> Study:
     if found.ratios is not None:
         from wristctl.identification.ratios import wrist_by_ratios
 
-        wrist = wrist_by_ratios(found.ratios, study, found.run)
+        ratios, kept = found.ratios, getattr(study, command.replace("-", "_")).kept
+        if "wrist.stiffness" in kept:
+            ratios = {**ratios, "values": {key: ratio for key, ratio in ratios["values"].items() if key != "force"}}
+        wrist = wrist_by_ratios(ratios, study, found.run)
         if not found.said:
-            log.info("%s", wrist.said(found.run))
+            log.info("%s", wrist.said(found.run, kept, found.taken))
             if command == "simulate" and study.simulate.loop.is_exact:
                 log.info(
                     "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", _RIG
@@ -350,6 +357,9 @@ def found_in(earlier: Any) -> Found:
         found = Found(earlier.id, earlier.file(IDENTIFIED).read_text(encoding="utf-8"))
     else:
         found = Found(earlier.id, "", read_json(earlier.file(RATIOS)) if earlier.has(RATIOS) else None)
+    study = earlier.config if isinstance(earlier, Run) else getattr(earlier, "study", None)
+    if study is not None and study.identify.logs:
+        found.wrist = study.wrist
     if not found.yaml and found.ratios is None:
         fix = "an identify run that did not refuse its logs or trials"
         raise UserError("no wrist was identified there", found.run, fix)

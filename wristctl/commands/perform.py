@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Generic
 
 from wristctl.commands.adoption import adopted, with_places, with_presets
+from wristctl.commands.beside_identified import beside_identified
 from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
 from wristctl.commands.plain_python import warn_of_plain
 from wristctl.commands.printed_table import Table
@@ -58,11 +59,12 @@ def prepare(
     out: Path,
     named_inputs: Mapping[str, Any] | None = None,
     files: Sequence[Path] = (),
+    origins: Mapping[KeyPath, Phrase] = MappingProxyType({}),
 ) -> Prepared[Found]:
     """Open the inputs of a study, and load its laws from elsewhere. Raises UserError.
 
     `named_inputs` come before those of the study, by leaf, and runs are in the folder `out`; where one of the study's
-    `files` is the configuration of a run, inputs may also be beside that run.
+    `files` is the configuration of a run, inputs may also be beside that run. `origins` are as `read_study` has them.
     """
     if procedure.completed is not None:
         study = procedure.completed(study)
@@ -74,6 +76,7 @@ def prepare(
     if inputs:
         named = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=named)
+    study = beside_identified(study, procedure.subject, inputs, origins)
     check_tendons(study, procedure)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
@@ -217,7 +220,7 @@ def carry_out(
     whole, origins = study_with(study, procedure.kind, settings)
     folder, show = Path(RESULTS if out is None else out), watched(progress)
     try:
-        prepared = prepare(procedure, whole, folder, named_inputs)
+        prepared = prepare(procedure, whole, folder, named_inputs, origins=origins)
         prepared.plan()
     except UserError as error:
         raise located(error, origins) from error

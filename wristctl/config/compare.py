@@ -3,7 +3,7 @@
 from wristctl.config.controller_row import REPETITIONS, Row
 from wristctl.config.families import Worlds
 from wristctl.config.loop import CAMERA, LOOPS, DirectionName, InverseName, Loop, Loops, Reference
-from wristctl.config.section import Section, choice, quantity, seldom
+from wristctl.config.section import Section, choice, kept_settings, quantity, seldom
 from wristctl.config.tune import TuneSettings
 
 # Preset of gains for motors, tendons and a camera.
@@ -57,4 +57,5 @@ class CompareSettings(Section):
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
     from_identified: str | None = seldom(None, "", "identify run whose parameters replace the study's")
+    kept: tuple[str, ...] = kept_settings()
     tuning: TuneSettings | None = choice(None, "a search for the controllers with gains: tuned, in place of a tune run")

@@ -11,7 +11,7 @@ from wristctl.config.choices import PLANTS_IN_SPACE, RIGS
 from wristctl.config.controller_row import BY_LOOP, GAINS, GainsChoice, Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference, comes_live
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
-from wristctl.config.section import OneOf, Section, choice, quantity, seldom
+from wristctl.config.section import OneOf, Section, choice, kept_settings, quantity, seldom
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
@@ -271,6 +271,7 @@ class HwRunSettings(RigSettings):
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
     from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
+    kept: tuple[str, ...] = kept_settings()
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")

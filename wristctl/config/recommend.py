@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 from wristctl.config.choices import RIGS
 from wristctl.config.families import Drawn, Family
 from wristctl.config.loop import TICK, Loop, Reference
-from wristctl.config.section import OneOf, Section, choice, quantity, seldom
+from wristctl.config.section import OneOf, Section, choice, kept_settings, quantity, seldom
 from wristctl.config.tune import Controllers
 
 # Where a simulated rig differs from what its controller believes. Angle and speed of each motion are drawn too. What
@@ -125,6 +125,7 @@ class RecommendSettings(Section):
         None, "", "a robot of your own, my_rig.py:RIG: rigs are drawn from the ranges of its facts"
     )
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+    kept: tuple[str, ...] = kept_settings()
 
     def measured(self, told: Collection[str] | None = None, usual: Mapping[str, Drawn] = _DRAWN) -> Self:
         """The settings for a wrist that was identified: where nobody says how, rigs differ by what that leaves open.

@@ -40,6 +40,11 @@ def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
     return quantity(default, unit, meaning, marks=("unsaid",), **constraints)
 
 
+def kept_settings() -> Any:
+    """The leaf beside `from_identified` of a section, to which `commands.beside_identified` adds."""
+    return seldom((), "", "settings given beside from_identified, which stay though its run tells them: wrist.damping")
+
+
 @dataclass(frozen=True, eq=False)  # a table has no hash, and a union of types asks for one
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""

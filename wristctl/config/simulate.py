@@ -4,7 +4,7 @@ from typing import Literal
 
 from wristctl.config.controller_row import BY_LOOP, CONTROLLER, GAINS, ControllerName, GainsChoice
 from wristctl.config.loop import DirectionName, Loop, Reference
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import Section, choice, kept_settings, quantity
 
 
 class SimulateSettings(Section):
@@ -23,6 +23,7 @@ class SimulateSettings(Section):
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+    kept: tuple[str, ...] = kept_settings()
 
 
 class AnalyseSettings(Section):

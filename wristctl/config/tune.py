@@ -9,7 +9,7 @@ from wristctl.config.choices import METRICS, OPTIMISERS
 from wristctl.config.controller_row import REPETITIONS, ControllerName
 from wristctl.config.families import TuningWorlds
 from wristctl.config.loop import CAMERA, LOOPS, Loops, Reference, Scenario
-from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, kept_settings, quantity
 from wristctl.errors import Unfitting
 
 
@@ -103,6 +103,7 @@ class TuneSettings(Section):
     repetitions: int = choice(1, REPETITIONS + " and candidates", ge=1, le=1000)
     network: str | None = choice(None, "train run behind references with inverse: network")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+    kept: tuple[str, ...] = kept_settings()
     resume: str | None = choice(None, "tune run that was cut short: what it has tried is not run again")
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ where K is what the wrist shows in its pose, its springs and its weight together
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -79,12 +79,20 @@ class LogWrist(NamedTuple):
     assumed: list[str]
     """Those that stay as the study has them by default."""
 
-    def said(self, run: str) -> str:
-        """Which settings are whose, in a sentence."""
-        values = [f"{name} = {value:.4g}" if value is not None else name for name, value in self.told.items()]
+    def said(self, run: str, kept: Sequence[str] = (), taken: Sequence[str] = ()) -> str:
+        """Which settings are whose, in a sentence.
+
+        `kept` are given though the log tells them, `loop.sensor.frame_rate`, ..., and `taken` are from the log's run.
+        """
+        own = {".".join(key.split(".")[-2:]) for key in kept}
+        told = {name: value for name, value in self.told.items() if name not in own}
+        values = [f"{name} = {value:.4g}" if value is not None else name for name, value in told.items()]
         parts = [f"the log of {run} tells {', '.join(values) or 'nothing of it'}"]
-        if self.given:
-            parts.append(f"the study {', '.join(self.given)}")
+        given = [name for name in self.given if name not in taken] + [name for name in self.told if name in own]
+        if given:
+            parts.append(f"the study {', '.join(given)}")
+        if taken:
+            parts.append(f"the settings of that run {', '.join(taken)}")
         if self.assumed:
             parts.append(f"assumed as by default: {', '.join(self.assumed)}")
         return f"Of this wrist {'; '.join(parts)}."

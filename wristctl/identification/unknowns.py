@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wristctl.config.loop import Loop
-from wristctl.config.plant import Actuator
+from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace, WristParameters
+from wristctl.identification.measured_trials import MOST_DELAYED
 from wristctl.simulation.planes import Asked, planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 from wristctl.wrist.directions import ACTIVE
@@ -165,7 +166,8 @@ def identified_yaml(
 def with_identified(study: Study, command: str, text: str) -> Study:
     """The study with the values of an identified.yaml in its wrist and in every actuator and sensor of the command.
 
-    Their levels stay as they are. Places of the four of a square are for a loop in two planes: in one they stand on it.
+    Their levels stay as they are, and so does what its section names as kept. Places of the four of a square are for a
+    loop in two planes: in one they stand on it.
     """
     mapping = parse_yaml(text, "identified.yaml").data
     loop = mapping["simulate"]["loop"]
@@ -173,17 +175,30 @@ def with_identified(study: Study, command: str, text: str) -> Study:
     name = command.replace("-", "_")
     settings = getattr(study, name)
     changed: dict[str, Any] = {}
+
+    def known(own: Any, place: str = "") -> dict[str, Any]:
+        """Actuator and sensor of a loop, or of trials, whose keys begin with `place`."""
+        told = {
+            part: {key: value for key, value in values.items() if f"{place}{part}.{key}" not in settings.kept}
+            for part, values in parts.items()
+        }
+        found = {part: getattr(own, part).model_copy(update=values) for part, values in told.items()}
+        return found | {"sensor": _once_a_tick(found["sensor"], parts["sensor"], told["sensor"], own.control_period)}
+
+    def loops_of(loops: Mapping[str, Loop], place: str) -> dict[str, Loop]:
+        return {key: loop.model_copy(update=known(loop, f"{place}.{key}.")) for key, loop in loops.items()}
+
     for leaf in type(settings).model_fields:
         value = getattr(settings, leaf)
         if isinstance(value, Loop):
-            changed[leaf] = _known(value, parts)
+            changed[leaf] = value.model_copy(update=known(value, f"{leaf}."))
         elif leaf == "loops":
-            changed[leaf] = {key: _known(part, parts) for key, part in value.items()}
+            changed[leaf] = loops_of(value, leaf)
         elif leaf == "tuning" and value is not None:  # a search that comes first, on loops of its own
-            changed[leaf] = value.model_copy(update={"loops": {k: _known(v, parts) for k, v in value.loops.items()}})
-        elif leaf in parts:
-            changed[leaf] = value.model_copy(update=parts[leaf])
-    found = dict(mapping["wrist"])
+            changed[leaf] = value.model_copy(update={"loops": loops_of(value.loops, f"{leaf}.loops")})
+    if parts.keys() <= type(settings).model_fields.keys():
+        changed |= known(settings)
+    found = {key: value for key, value in mapping["wrist"].items() if f"wrist.{key}" not in settings.kept}
     places = tuple(TendonPlace.model_validate(place) for place in found.pop("tendons", ()))
     wrist = study.wrist.model_copy(update=found)
     chosen, with_places = study.simulate, wrist.model_copy(update={"tendons": places})
@@ -195,10 +210,14 @@ def with_identified(study: Study, command: str, text: str) -> Study:
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})
 
 
-def _known(loop: Loop, parts: Mapping[str, Mapping[str, Any]]) -> Loop:
-    """The loop with these values; of a log with more readings than it has ticks it takes one a tick."""
-    known = {name: getattr(loop, name).model_copy(update=part) for name, part in parts.items()}
-    sensor = known["sensor"]
-    if sensor.level == "camera" and sensor.frame_rate * loop.control_period > 1.0:
-        known["sensor"] = sensor.model_copy(update={"frame_rate": 1.0 / loop.control_period})
-    return loop.model_copy(update=known)
+def _once_a_tick(sensor: Sensor, log: Mapping[str, Any], told: Mapping[str, Any], period: float) -> Sensor:
+    """The sensor, at one reading a tick where the log has more, and with the log's delay at the rate that it has.
+
+    `told` is what of the `log` nobody gave otherwise.
+    """
+    rate, changed = sensor.frame_rate, dict[str, Any]()
+    if sensor.level == "camera" and "frame_rate" in told and rate * period > 1.0 - 1e-9:
+        changed["frame_rate"] = rate = 1.0 / period
+    if "delay_frames" in told and log.get("frame_rate", rate) != rate:
+        changed["delay_frames"] = min(told["delay_frames"] * rate / log["frame_rate"], MOST_DELAYED)
+    return sensor.model_copy(update=changed)
