@@ -30,6 +30,11 @@ def way(time: Array) -> Array:
     return np.stack([y, z], axis=1)
 
 
+def sine(time: Array) -> Array:
+    """Bends (T, 2) [rad] that come back every 1.6 s."""
+    return 0.3 * np.stack([np.sin(4.0 * time), np.sin(8.0 * time)], axis=1)
+
+
 def motors(quantity: str = "spool", scale: float = 0.02, moved: Callable[[Array], Array] = way) -> OpenLog:
     """Twenty seconds of three motors, 100 rows/s."""
     time = 0.01 * np.arange(2000.0)
@@ -46,10 +51,10 @@ def mocap(offset: float, begin: float = 2.0, end: float = 18.0, moved: Callable[
     return OpenLog(Path("mocap.csv"), "log", columns)
 
 
-def shift_of(log: OpenLog) -> float:
+def shift_of(log: OpenLog, seen: OpenLog) -> float:
     """Time that was added to the motion's [s], without what it comes later by."""
-    first = log.columns["time"][np.isfinite(log.columns["bend_y"])][0]
-    return float(first) - 0.05
+    (row,) = np.flatnonzero(log.columns["bend_y"] == seen.columns["bend_y"][480])
+    return float(log.columns["time"][row] - seen.columns["time"][480]) - 0.05
 
 
 @settings(max_examples=15, deadline=None)
@@ -58,7 +63,7 @@ def test_the_shift_of_two_clocks_is_found(offset: float, begin: float) -> None:
     """Also where the camera began before the motors, or after."""
     seen = mocap(offset, begin, begin + 18.0)
     (log,) = joined_logs([seen, motors()])
-    assert shift_of(log) == pytest.approx(begin, abs=4e-3)
+    assert shift_of(log, seen) == pytest.approx(-offset, abs=4e-3)
     said = float(re.search(r"motors\.csv, ([+-][\d.]+) s", log.remarks[0])[1])  # type: ignore[index]
     assert said == pytest.approx(-offset, abs=4e-3)
 
@@ -70,7 +75,7 @@ def test_motors_may_have_spools_tensions_or_currents_and_a_camera_the_time_of_da
 ) -> None:
     seen = mocap(offset)
     (log,) = joined_logs([motors(quantity, scale), seen])
-    assert shift_of(log) == pytest.approx(2.0, abs=4e-3)
+    assert shift_of(log, seen) == pytest.approx(-offset, abs=4e-3)
     for name in ("bend_y", "bend_z"):
         column = log.columns[name]
         assert np.array_equal(column[np.isfinite(column)], seen.columns[name])
@@ -96,8 +101,9 @@ def test_logs_that_have_both_stay_as_they_are() -> None:
 
 
 def test_several_pairs_are_joined_in_their_order() -> None:
-    logs = joined_logs([motors(), motors(), mocap(7.0), mocap(-2.0)])
-    assert [shift_of(log) for log in logs] == pytest.approx([2.0, 2.0], abs=4e-3)
+    seen = [mocap(7.0), mocap(-2.0)]
+    logs = joined_logs([motors(), motors(), *seen])
+    assert list(map(shift_of, logs, seen)) == pytest.approx([-7.0, 2.0], abs=4e-3)
     with pytest.raises(UserError, match="2 logs of motors and 1 of the motion"):
         joined_logs([motors(), motors(), mocap(7.0)])
 
@@ -106,13 +112,38 @@ def test_a_motion_of_something_else_and_one_that_comes_back_are_refused() -> Non
     def other(time: Array) -> Array:
         return np.stack([np.sign(np.sin(17.0 * time**1.3)), np.sin(23.0 * np.sqrt(time))], axis=1)
 
-    def sine(time: Array) -> Array:
-        return 0.3 * np.stack([np.sin(4.0 * time), np.cos(4.0 * time)], axis=1)
-
     with pytest.raises(UserError, match=r"at no shift of clocks does its motion go with motors\.csv"):
         joined_logs([motors(), mocap(0.0, moved=other)])
-    with pytest.raises(UserError, match=r"join it to motors\.csv alike - .* a motion that does not come"):
-        joined_logs([motors(moved=sine), mocap(0.0, moved=sine)])
+    for offset in (0.4, 6.7):
+        with pytest.raises(UserError, match=r"join it to motors\.csv alike - .* a motion that does not come"):
+            joined_logs([motors(moved=sine), mocap(offset, moved=sine)])
+
+
+@pytest.mark.parametrize("late", [0.0, 0.03, -0.02])
+def test_of_shifts_of_a_motion_that_comes_back_the_one_of_a_common_clock_is_taken(late: float) -> None:
+    """Its zero is the best by no more than noise."""
+    seen = mocap(late, moved=sine)
+    (log,) = joined_logs([motors(moved=sine), seen])
+    assert shift_of(log, seen) == pytest.approx(-late, abs=4e-3)
+    assert "comes back" in log.remarks[-1] and "taken for the same" in log.remarks[-1]
+    assert "comes back" not in joined_logs([motors(), mocap(late)])[0].remarks[-1]
+
+
+def test_a_motion_that_all_but_comes_back_is_told_by_what_does_not() -> None:
+    def moved(time: Array) -> Array:
+        return sine(time) + 0.1 * np.exp(-(((time - 5.0) / 0.5) ** 2))[:, None]
+
+    seen = mocap(7.0, moved=moved)
+    (log,) = joined_logs([motors(moved=moved), seen])
+    assert shift_of(log, seen) == pytest.approx(-7.0, abs=4e-3)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(-4.0, 12.0), (6.0, 26.0)])
+def test_bends_that_were_seen_while_no_motors_were_logged_are_left_out(begin: float, end: float) -> None:
+    (log,) = joined_logs([motors(), mocap(7.0, begin, end)])
+    seen = log.columns["time"][np.isfinite(log.columns["bend_y"])]
+    assert seen[0] == pytest.approx(max(begin + 0.05, 0.0), abs=0.02)
+    assert seen[-1] == pytest.approx(min(end + 0.05, 19.99), abs=0.03)
 
 
 def test_logs_without_times_or_of_trials_are_not_joined() -> None:

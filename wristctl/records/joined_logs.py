@@ -23,8 +23,12 @@ _DRIVES = ("spool", "tension", "current")
 # Instants at which two logs are held against each other, time between two shifts that are tried [s], their largest
 # number, and share of the shorter log that both have at least.
 _INSTANTS, _EVERY, _MOST, _SHARED = 400, 0.03, 20_000, 0.5
-# Share of the motion that the motors have to say, and what may be left over of another shift over the least.
-_SAID, _AS_WELL = 0.5, 1.5
+# Share of the motion that the motors have to say; what may be left over of another shift over the least, and how much
+# more of the motion: a line leaves that over of any motion that comes back, at one shift or another.
+_SAID, _AS_WELL, _NO_WORSE = 0.5, 1.5, 1e-3
+# Shift [s] up to which two clocks may be the same, and one stream late.
+_SAME = 0.1
+_COMES_BACK = "one clock for both, or a motion that does not come back, such as a move of its own at the begin"
 # Time [s] by which the joined motion comes later than at the best shift: a fit then finds a delay that is not negative.
 _LATER = 0.05
 
@@ -53,12 +57,29 @@ class _Streams(NamedTuple):
         line = np.linalg.lstsq(drives, moves, rcond=1e-9)[0]
         return float(np.sum((moves - drives @ line) ** 2)) / _INSTANTS / whole
 
+    def trough(self, near: float, within: float) -> _Shift:
+        """The shift [s] within so much of one near it that leaves the least over."""
+        found = minimize_scalar(
+            lambda more: self.left_over(float(near + more)),
+            bounds=(-within, within), method="bounded", options={"xatol": 1e-4},
+        )  # fmt: skip
+        return _Shift(float(near + found.x), float(found.fun))
+
+
+class _Shift(NamedTuple):
+    """A shift of clocks [s] and the share of the motion that it leaves over."""
+
+    time: float
+    left: float
+
 
 def joined_logs(logs: Sequence[OpenLog]) -> list[OpenLog]:
     """Logs of which one has the motors alone and the next the motion alone as one log; others as they are.
 
-    The motion's times are shifted to the motors' clock, which a remark says. Raises UserError where there are not as
-    many of either kind, without times, and where no shift, or more than one, brings both together.
+    The motion's times are shifted to the motors' clock, which a remark says; what was seen before or after motors were
+    logged is left out. Of shifts that do as well it is the one at which the clocks are the same, if one is. Raises
+    UserError where there are not as many of either kind, without times, and where no shift, or another more than one,
+    brings both together.
     """
     drives = [log for log in logs if _drives(log) and not _moves(log)]
     motions = [log for log in logs if _moves(log) and not _drives(log)]
@@ -88,9 +109,11 @@ def _joined(drive: OpenLog, motion: OpenLog) -> OpenLog:
             fix = "one recording in each file, and further pairs of files for further trials"
             raise UserError("trials, and it is to be joined to another log", log.header or str(log.file), fix)
     streams = _Streams(*_stream(drive, _drives(drive)), *_stream(motion, _moves(motion)))
-    shift, left = _shift(streams, motion, drive)
-    columns = {name: column for name, column in motion.columns.items() if name not in drive.columns}
-    times = (drive.columns["time"], motion.columns["time"] + shift + _LATER)
+    shift, others = _shift(streams, motion, drive)
+    later = motion.columns["time"] + shift.time + _LATER
+    driven = (later >= streams.driven_at[0]) & (later <= streams.driven_at[-1])
+    columns = {name: column[driven] for name, column in motion.columns.items() if name not in drive.columns}
+    times = (drive.columns["time"], later[driven])
     time = np.unique(np.concatenate(times))
     merged = {"time": time}
     for part, at in ((drive.columns, times[0]), (columns, times[1])):
@@ -99,8 +122,8 @@ def _joined(drive: OpenLog, motion: OpenLog) -> OpenLog:
             merged[name] = np.full(len(time), math.nan)
             merged[name][rows] = part[name]
     said = (
-        f"{motion.file.name} is joined to {drive.file.name}, {shift:+.3f} s from its own clock, where the motors say "
-        f"{100.0 * (1.0 - left):.0f} % of the motion. Of two clocks the delay is not identifiable."
+        f"{motion.file.name} is joined to {drive.file.name}, {shift.time:+.3f} s from its own clock, where the motors "
+        f"say {100.0 * (1.0 - shift.left):.0f} % of the motion. {others}Of two clocks the delay is not identifiable."
     )
     remarks = [*drive.remarks, *motion.remarks, said]
     heads = {**motion.heads, **drive.heads}
@@ -118,26 +141,29 @@ def _stream(log: OpenLog, names: Sequence[str]) -> tuple[Array, Array]:
     return time, values[there]
 
 
-def _shift(streams: _Streams, motion: OpenLog, drive: OpenLog) -> tuple[float, float]:
-    """Time [s] to add to the motion's, and the share of the motion that is left over. Raises UserError without one."""
+def _shift(streams: _Streams, motion: OpenLog, drive: OpenLog) -> tuple[_Shift, str]:
+    """The shift of the motion's times, and a sentence on others that do as well. Raises UserError without one."""
     spans = [float(at[-1] - at[0]) for at in (streams.driven_at, streams.moved_at)]
     step = max(_EVERY, sum(spans) / _MOST)
     shared = _SHARED * min(spans)
     first = streams.driven_at[0] - streams.moved_at[-1] + shared
     shifts = np.arange(first, streams.driven_at[-1] - streams.moved_at[0] - shared + step, step)
     left = np.array([streams.left_over(float(shift)) for shift in shifts])
-    best = int(np.argmin(left))
-    where = motion.header or str(motion.file)
-    if not left[best] <= 1.0 - _SAID:
+    troughs = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:])) + 1
+    tried = {int(np.argmin(left)), *(int(k) for k in troughs if left[k] <= 1.0 - _SAID)}
+    found = sorted((streams.trough(float(shifts[k]), step) for k in tried), key=lambda shift: shift.left)
+    best, where = found[0], motion.header or str(motion.file)
+    if not best.left <= 1.0 - _SAID:
         fix = "are both of one recording, and spools of all tendons there?"
         raise UserError(f"at no shift of clocks does its motion go with {drive.file.name}", where, fix)
-    troughs = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:])) + 1
-    others = [k for k in troughs if abs(k - best) > 1 and left[k] <= _AS_WELL * left[best]]
-    if others:
-        problem = f"shifts of {shifts[best]:.3g} and {shifts[others[0]]:.3g} s join it to {drive.file.name} alike"
-        raise UserError(problem, where, "a motion that does not come back, such as a move of its own at the begin")
-    found = minimize_scalar(
-        lambda more: streams.left_over(float(shifts[best] + more)),
-        bounds=(-step, step), method="bounded", options={"xatol": 1e-4},
-    )  # fmt: skip
-    return float(shifts[best] + found.x), float(found.fun)
+    most = max(_AS_WELL * best.left, best.left + _NO_WORSE)
+    alike = [shift for shift in found if shift.left <= most and abs(shift.time - best.time) > step]
+    if not alike:
+        return best, ""
+    zero = _Shift(0.0, streams.left_over(0.0))
+    same = zero if zero.left <= most else min((best, *alike), key=lambda shift: abs(shift.time))
+    if abs(same.time) > _SAME:
+        problem = f"shifts of {best.time:.3g} and {alike[0].time:.3g} s join it to {drive.file.name} alike"
+        raise UserError(problem, where, _COMES_BACK)
+    other = max((best, *alike), key=lambda shift: abs(shift.time))
+    return same, f"The motion comes back, so that {other.time:+.3g} s does as well; the clocks are taken for the same. "
