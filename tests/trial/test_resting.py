@@ -94,6 +94,17 @@ def test_a_wrist_that_leans_on_a_tendon_is_not_slack(planes: tuple[str, ...]) ->
                 judge_slack(bend, rig, wrist, planes)
 
 
+@pytest.mark.parametrize(("rig", "fix"), [(None, "wristctl hw slacken"), ("servos", "before the rig is")])
+def test_a_taut_tendon_is_among_the_causes_with_how_to_let_it_go(rig: str | None, fix: str) -> None:
+    """A wrist that a tendon pulls aside looks like one that leans: before anything has moved, and after."""
+    settings = settings_of(rig=rig, calibration=None, positions="find")
+    with pytest.raises(SafetyStop, match="a tendon is taut") as before:
+        judge_rest(sightings(9.0), settings, WRIST, ("ulnar",))
+    with pytest.raises(SafetyStop, match="a tendon is taut") as after:
+        judge_slack((math.radians(9.0), 0.0), settings, WRIST, ("ulnar",))
+    assert fix in str(before.value.fix) and fix in str(after.value.fix)
+
+
 @pytest.mark.parametrize(("gravity", "how"), [((0.0, 9.81), "sags by 2"), ((0.0, -9.81), "sags by -2")])
 def test_a_wrist_that_sags_too_far_by_its_own_account_is_refused(gravity: tuple[float, float], how: str) -> None:
     level = WRIST.model_copy(update={"gravity": gravity})

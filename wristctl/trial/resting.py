@@ -11,6 +11,7 @@ import numpy as np
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.trial.rig_words import words_of_board, words_of_rig
 from wristctl.trial.safety import SafetyStop
 from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import in_plane
@@ -89,9 +90,13 @@ def judge_slack(bend: Sequence[float], settings: RigSettings, wrist: WristParame
 
 def _off(problem: str, off: float, settings: RigSettings) -> SafetyStop:
     problem += f", {math.degrees(off):.1f} deg off where its weight should let it"
-    likely = "the frame is not as wrist.gravity says, something pushes at the hand, or the marker is glued on askew"
-    fix = "set the frame plumb, free the hand of cables, see the marker; or say how it stands (wrist.gravity)"
-    return SafetyStop(f"{problem}; likely {likely}", "homing", fix)
+    likely = (
+        "a tendon is taut, the frame is not as wrist.gravity says, something pushes at the hand, or the marker is "
+        "glued on askew"
+    )
+    words = (words_of_rig if getattr(settings, "rig", None) is not None else words_of_board)((), ())
+    fix = f"{words.taut}; set the frame plumb, free the hand of cables, see the marker; or say how it stands"
+    return SafetyStop(f"{problem}; likely {likely}", "homing", f"{fix} (wrist.gravity)")
 
 
 def _judge_noise(
