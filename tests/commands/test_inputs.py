@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,15 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import repeated, session
+from wristctl.commands.hw_run.command import HW_RUN
 from wristctl.commands.inputs import EarlierRun, Inputs, named_for_good, opened
+from wristctl.commands.perform import prepare
 from wristctl.commands.simulate.results import Simulated
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run
+from wristctl.study_files.load import load_study
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.homing import Zero
 
 STUDY = wristctl.load_study(None)
 NETWORK, TUNED = EarlierRun("network", "train", optional=True), EarlierRun("tuned", "tune", optional=True)
@@ -142,3 +148,34 @@ def test_runs_are_named_by_id_within_the_folder_and_by_path_beyond_it(tmp_path: 
     assert section.horizon == STUDY.simulate.horizon
     several = Inputs({"runs[0]": outside, "runs[1]": inside})
     assert named_for_good(several, STUDY.identify, tmp_path / "in").runs == (str(outside.path), inside.id)
+
+
+def calibrated_in(out: Path, markers: int, label: str) -> Run:
+    """A run that keeps a calibration by so many cameras."""
+    zero = Zero((1, 1, 1, 1), (900.0,) * 4, (0.0,) * markers, (0.0,) * 4)
+    with start_run("calibrate-wrist", STUDY, label, out) as live:
+        live.file("data/wrist.json").write_text(json.dumps(WristCalibration(zero, "ulnar", 1, (0,) * 4).plain()))
+    return Run(live.path)
+
+
+def test_a_calibration_of_other_planes_is_passed_over_and_refused_by_name(tmp_path: Path) -> None:
+    """Of a study that gives its planes, and of one whose reference needs two."""
+    two, one = calibrated_in(tmp_path, 2, "two"), calibrated_in(tmp_path, 1, "one")
+    for settings, fits, other, where in (
+        (["planes=2"], two, one, "in two planes"),
+        (["reference.kind=circumduction"], two, one, "in two planes"),
+        ([], one, two, "in one plane"),
+    ):
+        study = load_study((), settings, "hw-run")
+        prepared = prepare(HW_RUN, study, tmp_path, {"calibration": "latest:calibrate-wrist"})
+        assert prepared.inputs.runs()["calibration"].path == fits.path
+        with pytest.raises(UserError, match=f"holds no calibration of all axes {where}") as refused:
+            prepare(HW_RUN, study, tmp_path, {"calibration": other.id})
+        assert refused.value.where == str(other.path)
+
+
+def test_a_board_without_a_calibration_of_its_planes_is_told_what_makes_one(tmp_path: Path) -> None:
+    calibrated_in(tmp_path, 1, "one")
+    with pytest.raises(UserError, match=r"no calibrate-wrist run .* in two planes") as refused:
+        prepare(HW_RUN, load_study((), ["planes=2"], "hw-run"), tmp_path, {"calibration": "latest:calibrate-wrist"})
+    assert "wristctl hw calibrate wrist" in str(refused.value.fix)

@@ -32,14 +32,15 @@ class EarlierRun:
     """An earlier run that a command reads: the leaf of its section that names it, and the kind it must be.
 
     `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. `content`
-    is a file that it must have and other runs of its kind may lack. A leaf that is a tuple names any number of runs.
+    is a file that it must have and other runs of its kind may lack, or says which by the section. A leaf that is a
+    tuple names any number of runs.
     """
 
     leaf: str
     kind: str | None
     optional: bool = False
     unfinished: bool = False
-    content: Content | None = None
+    content: Content | Callable[[Any], Content] | None = None
 
 
 # What several commands read: the network of a reference, gains that were tuned, and a wrist that was identified.
@@ -101,13 +102,15 @@ def opened(
         if named_inputs[name] is not None:
             raise UserError(f"{kind} reads no earlier run here", Argument(name), "leave it out")
     for need in needs:
+        content = need.content(section) if callable(need.content) else need.content
         named, several = _here(getattr(section, need.leaf), out, beside), isinstance(getattr(section, need.leaf), tuple)
         chosen = named if named_inputs.get(need.leaf) is None else named_inputs[need.leaf]
         if several and chosen:
             chosen_runs = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else (chosen,)
-            by_role |= {f"{need.leaf}[{number}]": _one(one, need, out) for number, one in enumerate(chosen_runs)}
+            for number, one in enumerate(chosen_runs):
+                by_role[f"{need.leaf}[{number}]"] = _one(one, need, out, content)
         elif chosen:
-            by_role[need.leaf] = _one(chosen, need, out)
+            by_role[need.leaf] = _one(chosen, need, out, content)
         elif not need.optional:
             raise missing_run(kind, need, several)
     return Inputs(by_role)
@@ -140,7 +143,7 @@ def _here(named: Any, out: Path, beside: Sequence[Path]) -> Any:
     return next((str(path) for path in places if (path / MANIFEST).is_file()), named)
 
 
-def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
+def _one(chosen: RunChoice, need: EarlierRun, out: Path, content: Content | None) -> Given:
     if isinstance(chosen, StudyResult):
         if need.kind not in (None, chosen.kind):
             fix = ("for example ", Argument(need.leaf, f"latest:{need.kind}"))
@@ -148,7 +151,7 @@ def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
         return chosen
     ref = chosen.path if isinstance(chosen, Run) else chosen
     if not need.unfinished:
-        return require(ref, need.kind, out, need.content)
+        return require(ref, need.kind, out, content)
     run = open_run(ref, out)
     if run.kind != need.kind:
         raise UserError(f"{a_run(run.kind)} where {a_run(need.kind)} is needed", str(run.path), "name another")

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
@@ -77,6 +77,8 @@ class Content(NamedTuple):
     what: str
     instead: str = ""
     """Another file that will do."""
+    fits: Callable[[Path], bool] = lambda file: True
+    """Whether its file is what is wanted."""
 
     @property
     def named(self) -> str:
@@ -85,7 +87,8 @@ class Content(NamedTuple):
 
     def of(self, run: Path) -> bool:
         """Whether the run in this folder has it."""
-        return any((run / name).is_file() for name in filter(None, (self.file, self.instead)))
+        files = (run / name for name in (self.file, self.instead) if name)
+        return any(file.is_file() and self.fits(file) for file in files)
 
 
 def a_run(kind: str | None, what: str = "run") -> str:

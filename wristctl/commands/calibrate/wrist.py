@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -12,6 +13,7 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import coming_first, describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
+from wristctl.plain_files import read_json
 from wristctl.records.find import Content
 
 if TYPE_CHECKING:
@@ -22,6 +24,21 @@ if TYPE_CHECKING:
 
 # What a run of one axis alone lacks.
 CALIBRATION = Content("data/wrist.json", "calibration of all axes")
+
+
+def calibration_in(planes: int) -> Content:
+    """Calibration of all axes of a rig that bends in so many planes."""
+
+    def fits(file: Path) -> bool:
+        try:
+            return ("marker_2" in read_json(file)) == (planes == 2)
+        except (OSError, ValueError, TypeError):  # which is said where it is read
+            return True
+
+    where = "one plane" if planes == 1 else "two planes"
+    return CALIBRATION._replace(what=f"{CALIBRATION.what} in {where}", fits=fits)
+
+
 _OF_AXIS = ("axis", "tendon", "sense", "taken up [mm]", "bend [deg]")
 _TOWARD = ("toward [deg]", "its tendon [deg]")
 _COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]", "friction [mm]")

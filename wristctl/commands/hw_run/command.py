@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.adoption import wound_in_both_planes
-from wristctl.commands.calibrate.wrist import CALIBRATION
+from wristctl.commands.adoption import with_planes, wound_in_both_planes
+from wristctl.commands.calibrate.wrist import calibration_in
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
@@ -177,6 +177,11 @@ def _dare(session: Session, danger: str, fix: str) -> None:
         session.operator.dare(danger, "hw-run.safety.motor_pull", fix)
 
 
+def _with_planes(study: Study) -> Study:
+    """The study with as many planes as its trials need, by which a calibration is chosen; of a rig its facts say it."""
+    return with_planes(study) if study.hw_run.rig is None else study
+
+
 def _in_one_plane(study: Study) -> bool:
     """Whether a board's trials bend the wrist in one plane: its tendons may ask for both where nobody gave planes."""
     settings = study.hw_run
@@ -192,12 +197,13 @@ HW_RUN: Procedure[Performed] = Procedure(
     plan,
     hw_run,
     (
-        EarlierRun("calibration", kind="calibrate-wrist", optional=True, content=CALIBRATION),
+        EarlierRun("calibration", "calibrate-wrist", True, content=lambda section: calibration_in(section.planes)),
         EarlierRun("optics", kind="calibrate-camera", optional=True),
         EarlierRun("optics_2", kind="calibrate-camera", optional=True),
         FROM_IDENTIFIED,
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("network", kind="train", optional=True),
     ),
+    completed=_with_planes,
     in_one_plane=_in_one_plane,
 )
