@@ -49,6 +49,7 @@ SENT = "        return sent\n"
 SENDS = "        self._heard, sent ="
 LOOKS = "        now = self.clock.now()\n        while len"
 PULLS = "        pulls = TENDON"
+WAITS = "self.clock.wait_until(self.clock.now() + 0.06)"
 BENT = "        if self._bend[0] > 0.15:\n            "
 
 # Two tendons in one plane, by the same file.
@@ -89,6 +90,7 @@ BROKEN: dict[str, tuple[str, str, str]] = {
     "a motor without power": (PLANT, PLANT.replace("sent", "sent * np.array([1.0, 1.0, 0.0])"), "sense"),
     "targets of half a mm": (PLANT, PLANT.replace("1e-3", "0.5e-3"), "scale"),
     "late motors": ("self.clock.now() + DELAY", "self.clock.now() + 0.1", "delay"),
+    "motors somewhat late": ("self.clock.now() + DELAY", "self.clock.now() + DELAY + 0.01", "delay"),
     "bends dated too late": (NEWEST, "time, bend = (now - DELAY, self._seen[0][1]) if", "delay"),
     "stop does nothing": ("        self._coming.clear()", "        pass", "stop"),
     "close fails": ("    def close(self):\n        self.stop()", "    def close(self):\n        1 / 0", "close"),
@@ -142,6 +144,21 @@ def test_a_broken_rig_is_named_by_its_check(tmp_path: Path, wrong: str) -> None:
     before, after, check = BROKEN[wrong]
     found = checked(written(tmp_path, (before, after), *([ALSO[wrong]] if wrong in ALSO else [])))
     assert [name for name, one in found.items() if one.passed is False] == [check], found
+
+
+@pytest.mark.parametrize(("before", "call"), [(LOOKS, "look()"), (SENDS, "send()")], ids=["look", "send"])
+def test_a_call_that_waits_longer_than_a_tick_is_named(tmp_path: Path, before: str, call: str) -> None:
+    """News at every poll are not often enough where a poll itself takes long."""
+    found = checked(written(tmp_path, (before, f"        {WAITS}\n{before}")))
+    assert [name for name, one in found.items() if one.passed is False] == ["looks"], found
+    assert f"{call} takes 60 ms" in found["looks"].found and "thread" in found["looks"].fix
+
+
+def test_calls_that_together_take_longer_than_a_tick_are_both_told(tmp_path: Path) -> None:
+    waits = ((LOOKS, 0.007), (SENDS, 0.004))
+    longer = [(before, f"        {WAITS.replace('0.06', str(seconds))}\n{before}") for before, seconds in waits]
+    looks = checked(written(tmp_path, *longer))["looks"]
+    assert looks.passed is False and "look() takes 7 ms and send() 4 ms" in looks.found
 
 
 class _Tried:
@@ -259,6 +276,8 @@ FAILING: dict[str, tuple[str, str, type[UserError], str]] = {
         "look() gives no number",
     ),
     "stale": (LOOKS, f"{BENT}return Look(np.zeros(2), 0.0)\n{LOOKS}", SafetyStop, "look() brings nothing new"),
+    "slow look": (LOOKS, f"{BENT}{WAITS}\n{LOOKS}", SafetyStop, "late: look() takes 60 ms"),
+    "slow send": (SENDS, f"{BENT}{WAITS}\n{SENDS}", SafetyStop, "late: send() takes 60 ms"),
     "tendon cut": (
         PULLS,
         f"{BENT}self._reeled = self._reeled - [1.0, 0.0, 0.0]\n{PULLS}",

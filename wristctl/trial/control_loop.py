@@ -241,7 +241,7 @@ class ControlLoop:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
         taut, _ = self._belief.taut(estimate.theta)
         delay, heard = late + self._skipped * self._period, self._drive.heard
-        told = heard.state, heard.lapses, heard.resent, clock - heard.counted, self._drive.tension
+        told = heard.state, heard.lapses, heard.resent, clock - heard.counted, self._drive.tension, heard.slow
         tick = Tick(clock, delay, estimate, position, taut, *told)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)

@@ -38,6 +38,8 @@ class Heard(NamedTuple):
     """Commands that came too late to be followed, modulo 256."""
     resent: int = 0
     """Commands that were sent again."""
+    slow: str = ""
+    """The call of a rig of one's own that takes long, with its time; empty where none does."""
 
 
 class BoardDrive:

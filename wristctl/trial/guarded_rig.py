@@ -50,8 +50,8 @@ class GuardedRig:
         self.rig, self.where = rig, where
         self.facts: Facts = rig.facts
         self._count, self._clock = len(self.facts.tendons), -np.inf
-        self.took = 0.0
-        """Seconds on the rig's clock that the last `send` took."""
+        self.took = {"send()": 0.0, "look()": 0.0}
+        """Seconds on the rig's clock that the last call of each took."""
         self.tension: Array | None = None
         """Tension (T,) [N] by the last look; None where it gave none."""
         self.reeled: tuple[Array, float] | None = None
@@ -82,12 +82,14 @@ class GuardedRig:
         """Send targets (T,) [facts.unit]; what was really sent (T,)."""
         before = self.now()
         sent = self._values("send", self._call("send", lambda: self.rig.send(targets.copy())), self._count)
-        self.took = self.now() - before
+        self.took["send()"] = self.now() - before
         return sent
 
     def look(self) -> Seen:
         """The newest bend. A bend that is infinite counts as not seen."""
+        before = self.now()
         look = self._call("look", self.rig.look)
+        self.took["look()"] = self.now() - before
         try:
             bend, time, *measured = look
             tension, reeled, tip = (*measured, None, None, None)[: max(3, len(measured))]
@@ -107,6 +109,11 @@ class GuardedRig:
         places, (moment,) = (self._values("look", values, count) for values, count in
                              ((reeled.targets, self._count), ([reeled.time], 1)))  # fmt: skip
         return places, float(moment)
+
+    def slow(self, most: float) -> str:
+        """The slower of send() and look() with its time, in words, where its last call took longer than `most` [s]."""
+        call, seconds = max(self.took.items(), key=lambda timed: timed[1])
+        return f"{call} takes {1e3 * seconds:.0f} ms" if seconds > most else ""
 
     def stop(self) -> str:
         """Stop the motors; what went wrong with that, in words, empty where nothing did."""

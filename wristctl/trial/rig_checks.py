@@ -16,6 +16,7 @@ from wristctl.trial.homing import Finder, rest_of
 from wristctl.trial.rig_drive import RigTracking
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_stand import PLANE, halt_rig
+from wristctl.trial.rig_words import SLOW_CALL
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Seconds for which looks are watched, a response to a step, and between two polls of a rig.
@@ -26,8 +27,8 @@ _STEPS = 6
 _SELDOM, _NOISY = 0.7, 2.0
 # Share of the looks that are news of a sensor that is faster than anybody asks it.
 _ALWAYS = 0.9
-# Seconds by which a wrist's own inertia may delay what is seen of a step, and by which a clock may err.
-_INERTIA, _CLOCK = 0.02, 0.05
+# Seconds by which looks may be dated wrongly, and by which a clock may err.
+_DATED, _CLOCK = 3e-3, 0.05
 # Share of a step's bend from which it has begun, and beyond which a stopped motor has gone on.
 _BEGUN, _GONE_ON = 0.1, 0.6
 
@@ -97,15 +98,17 @@ class RigTrier:
     def _news(self, seconds: float) -> Array:
         """Looks that are news, of so long [s]: their time [s] and bend (P,) [rad], (n, 1 + P). `_arrived` says when."""
         rows, newest, end = list[list[float]](), -math.inf, self._rig.now() + seconds
-        self._arrived, self._polls = list[float](), 0
+        self._arrived, self._polls, took = list[float](), 0, list[tuple[float, ...]]()
         while self._rig.now() < end:
             seen, now = self._rig.look(), self._rig.now()
+            took.append(tuple(self._rig.took.values()))
             if seen.time > newest and np.isfinite(seen.bend).all():
                 newest = seen.time
                 rows.append([seen.time, *seen.bend.tolist()])
                 self._arrived.append(now)
             self._motors.wait(min(5.0 * _POLL, max(_POLL, 0.25 / value(self._facts.sensor.rate))))
             self._polls += 1
+        self._takes = dict(zip(self._rig.took, np.median(took, axis=0).tolist(), strict=True))
         return np.array(rows).reshape(len(rows), 1 + self._facts.planes)
 
     def _seen(self, seconds: float) -> Array:
@@ -121,12 +124,14 @@ class RigTrier:
         if len(news) < 3:
             raise Unfit(f"{len(news)} looks in {_WATCHED:g} s are news: their bend is nan, or their time stands still")
         self._rest = news
+        self._judge_calls()
         rate = (len(news) - 1) / (self._arrived[-1] - self._arrived[0])
         least = sensor.rate.low if isinstance(sensor.rate, Spread) else sensor.rate
         ages = np.array(self._arrived) - news[:, 0]
         if ages.min() < -1e-3:
             raise Unfit(f"a look is {-1e3 * ages.min():.3g} ms ahead of the clock")
-        if rate < _SELDOM * least and len(news) < _ALWAYS * self._polls:
+        asked = _SELDOM / self._settings.control_period
+        if rate < _SELDOM * least and (len(news) < _ALWAYS * self._polls or rate < asked):
             raise Unfit(f"{rate:.3g} looks/s are news, and facts.sensor.rate is {value(sensor.rate):g}")
         age, meant = float(np.median(ages)), sensor.delay
         off = 1.0 / value(sensor.rate) + 5e-3
@@ -134,6 +139,15 @@ class RigTrier:
             raise Unfit(f"looks are {1e3 * age:.3g} ms old, and facts.sensor.delay is {1e3 * value(meant):g} ms")
         facts = f"{value(sensor.rate):g} and {1e3 * value(meant):g}"
         return f"{rate:.3g} news/s, {1e3 * age:.3g} ms old when they come (facts: {facts})"
+
+    def _judge_calls(self) -> None:
+        """Raises Unfit where look() and send() take longer than a tick; it names the slower first."""
+        period = self._settings.control_period
+        (slow, longer), (other, shorter) = sorted(self._takes.items(), key=lambda call: -call[1])
+        if longer + shorter > period:
+            beside = f" and {other} {1e3 * shorter:.3g} ms" if longer <= period else ""
+            problem = f"{slow} takes {1e3 * longer:.3g} ms{beside}, and a tick of trials is {1e3 * period:g} ms"
+            raise Unfit(problem, fix=SLOW_CALL)
 
     def _noisy(self) -> str:
         self._noise = float(self._rest[:, 1:].std(axis=0).max())
@@ -210,24 +224,24 @@ class RigTrier:
         self._motors.reel(self._slack - 2.0 * self._settings.homing.pull)
 
     def _delay(self) -> str:
-        """From send() until the bend has changed, by the times of looks: what the drive's delay and lag explain."""
-        pull, drive, sensor = self._settings.homing.pull, self._facts.drive, self._facts.sensor
-        begun = []
-        for number in range(_STEPS):
-            tendon = number % len(self._slack)
-            begun.append(self._step(tendon, pull)[0])
-        dead, spread = float(np.median(begun)), float(np.std(begun))
-        off = 1.5 / value(sensor.rate) + _INERTIA
-        if not _low(drive.delay) - off <= dead <= most(drive.delay) + 2.0 * most(drive.lag) + off:
-            raise Unfit(
-                f"a target is seen to act after {1e3 * dead:.0f} ms, and facts.drive.delay is "
-                f"{1e3 * value(drive.delay):g} ms; or look() dates its bends wrongly"
-            )
-        facts = f"{1e3 * value(drive.delay):g} and a lag of {1e3 * value(drive.lag):g}"
-        return f"a target acts after {1e3 * dead:.0f} ms +-{1e3 * spread:.1f} (facts: {facts})"
+        """From send() until the bend changes, by the times of looks: what the drive's delay and lag explain.
 
-    def _step(self, tendon: int, pull: float, stop: bool = False) -> tuple[float, float]:
-        """Seconds after which a step of a tendon beyond its taut point shows, and the share of its bend.
+        A wrist's own inertia delays what is seen of a step, and makes its bend begin as the square of time: so far back
+        the first looks at it are extrapolated. The bend of one that hardly has any begins before that.
+        """
+        pull, drive, sensor = self._settings.homing.pull, self._facts.drive, self._facts.sensor
+        times = np.array([self._step(number % len(self._slack), pull)[0] for number in range(_STEPS)])
+        seen, dead = np.median(times, axis=0).tolist()
+        off, winds = 1.0 / value(sensor.rate) + _DATED, pull / self._facts.limits.rate
+        facts = f"{1e3 * value(drive.delay):g} and a lag of {1e3 * value(drive.lag):g}"
+        acts = f"acts after {1e3 * max(0.0, dead):.0f} ms, and " if math.isfinite(dead) else ""
+        told = f"a target {acts}shows after {1e3 * seen:.0f} ms"
+        if seen < _low(drive.delay) - off or dead > most(drive.delay) + 2.0 * most(drive.lag) + winds + off:
+            raise Unfit(f"{told}, and facts.drive says {facts} ms; or look() dates its bends wrongly")
+        return f"{told} +-{1e3 * float(np.std(times[:, 0])):.1f} (facts: {facts})"
+
+    def _step(self, tendon: int, pull: float, stop: bool = False) -> tuple[tuple[float, float], float]:
+        """A step of a tendon beyond its taut point: after how many seconds it shows, and acts, and its bend's share.
 
         With `stop` the rig is stopped as soon as the step is sent.
         """
@@ -253,8 +267,10 @@ class RigTrier:
                     f"a step of target {tendon + 1} bends the wrist by {math.degrees(last):.2f} of "
                     f"{math.degrees(meant):.2f} deg"
                 )
-        past = np.flatnonzero((along > max(_BEGUN * meant, 4.0 * self._noise)) & (news[:, 0] >= sent_at))
-        return (float(news[past[0], 0] - sent_at) if len(past) else math.nan), last / meant
+        since, least = news[:, 0] - sent_at, max(_BEGUN * meant, 4.0 * self._noise)
+        clear = max(1.5 * least, min(4.0 * least, 0.8 * last))
+        shown, further = (_passes(since, along, bend) for bend in (least, clear))
+        return (shown, shown - (further - shown) / (math.sqrt(clear / least) - 1.0)), last / meant
 
     def _silent_looks(self, seconds: float) -> Array:
         """All looks of so long [s], as `_news` has them, while nothing is sent."""
@@ -278,6 +294,17 @@ class RigTrier:
             )
         done = f"{100.0 * max(0.0, share):.0f} % of a step that was stopped at once"
         return f"stands {1e3 * halted.seconds:.0f} ms after a second stop(); {done}"
+
+
+def _passes(since: Array, along: Array, bend: float) -> float:
+    """Seconds after which a bend goes beyond this one for good; nan where it never does."""
+    past = np.flatnonzero((along > bend) & (since >= 0.0))
+    if not len(past):
+        return math.nan
+    first = int(past[0])
+    if first == 0 or along[first - 1] >= bend:
+        return float(since[first])
+    return float(np.interp(bend, along[first - 1 : first + 1], since[first - 1 : first + 1]))
 
 
 def _low(quantity: float | Spread) -> float:

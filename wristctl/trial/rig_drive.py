@@ -60,7 +60,8 @@ class RigDrive(RigMotors):
     @property
     def heard(self) -> Heard:
         """As reckoned; a rig that does not follow raises."""
-        return Heard(self._counted, self._counted, self._rig.took)
+        took, slow = self._rig.took["send()"], self._rig.slow(0.5 * self._period)
+        return Heard(self._counted, self._counted, took, slow=slow)
 
     @property
     def tension(self) -> Array:

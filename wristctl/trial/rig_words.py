@@ -16,6 +16,8 @@ PUSHED = "something holds or pushes the wrist"
 DEAD = "its tendon is slack (motors that a stop released keep none taut) or off, or it has no power"
 """Of a motor that bends nothing."""
 REPEATS = "the camera or its driver repeats old pictures: plug it in again, another USB port"
+SLOW_CALL = "have it return at once, with the newest that a thread of its own has read; or a longer control_period"
+"""Of a call of a rig of one's own that takes longer than a tick."""
 _LOOK = "slacken the tendons by hand, look"
 
 

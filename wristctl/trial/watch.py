@@ -19,7 +19,7 @@ from wristctl.trial.camera_record import CameraRecord, Frame, MarkerLag, Recent,
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
 from wristctl.trial.rig_belief import TOWARD, names_of_planes, numbers_of, pull_directions, unit_toward
-from wristctl.trial.rig_words import words_of_board, words_of_rig
+from wristctl.trial.rig_words import SLOW_CALL, words_of_board, words_of_rig
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
@@ -59,6 +59,8 @@ class Tick(NamedTuple):
     """Time since the board has counted the spools' steps."""
     tension: Array | None = None
     """Measured tension of each tendon (T,) [N], where a robot of one's own gives any; nan where it gives none."""
+    slow: str = ""
+    """The call of a robot of one's own that takes long, with its time; empty where none does."""
 
 
 class _Past(NamedTuple):
@@ -244,6 +246,8 @@ class Watch:
             problem += f" ({why})"
         elif name == "disabled":
             problem = f"the board is {tick.state.name}, not ENABLED"
+        elif name in ("late", "skipped") and tick.slow:
+            problem, fix = f"{problem}: {tick.slow}", SLOW_CALL
         elif name == "skipped":
             blamed = Counter(who for who in self._blamed.values(tick.clock) if math.isfinite(who))
             culprit = list(FIX)[int(blamed.most_common(1)[0][0])]
