@@ -310,7 +310,8 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
     assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
     assert all(note in " ".join(answer_of(table, twins, {}, [], "").lines()) for note in notes)
     told = " ".join(" ".join(answer_of(table, twins, {}, [], "").lines()).split())
-    assert told.count("Do not rely on that simulation here.") == 1, "once for all that is apart"
+    assert told.count("Do not rely on that simulation here.") == 1, "once, where the simulation is the kinder one"
+    assert told.index("Do not rely") < told.index("the rig is kinder")
     largest = (0.3 if known else 0.6, 0.6)
     assert f"moves by at most {largest[0]} deg peak to peak at rest{' (truly 0.6 deg)' * known}" in told
     assert f"asked for at most {two(float(table['peak_tension'].max()))} N" in told
@@ -382,6 +383,37 @@ def test_in_two_planes_simulation_is_held_against_the_worse_plane(worse: str, kn
     agree = {name: np.radians(1.6) for name in ("rmse_ulnar", "rmse_flexion")}
     sound = " ".join(_in_two_planes(rests=True, simulated=1.6, **agree).lines())
     assert "do not agree" not in sound and "Do not rely" not in sound
+
+
+def _errors(*measured: float, simulated: float = 0.1, **true: float) -> str:
+    """The answer of trials in one plane without a push with these errors [deg], beside a simulation of one error."""
+    rows = _small().query("controller == 'smc' and push == 0.0").iloc[:1]
+    table = pd.concat([rows] * len(measured), ignore_index=True)
+    table = table.assign(trial=range(len(measured)), rmse=np.radians(measured), true_rmse=np.nan, **true)
+    twin = repeated("twin", [np.radians(simulated)]).first
+    return " ".join(" ".join(answer_of(table, dict.fromkeys(range(len(measured)), twin), {}, [], "").lines()).split())
+
+
+def test_a_simulation_that_is_the_kinder_one_is_warned_of_and_a_harsher_one_is_told_mildly() -> None:
+    worse, better, alike = (_errors(error) for error in (0.2, 0.05, 0.14))
+    assert "0.2 deg, 2 times larger than 0.1 deg simulated" in worse and "Do not rely on that simulation" in worse
+    assert "0.05 deg, 2 times smaller than 0.1 deg simulated" in better and "harsher" in better
+    assert "Do not rely" not in better and "do not agree" not in better
+    assert "simulated." not in alike and "Do not rely" not in alike and "harsher" not in alike
+
+
+@pytest.mark.parametrize(("error", "simulated"), [(0.035, 0.021), (0.01, 0.021)])
+def test_a_difference_that_no_camera_can_tell_is_none(error: float, simulated: float) -> None:
+    small, large = (_errors(times * error, simulated=times * simulated) for times in (1.0, 10.0))
+    assert "times" not in small
+    assert "times" in large and ("Do not rely" in large) == (error > simulated)
+
+
+@pytest.mark.parametrize(("errors", "told"), [((0.12, 0.12, 0.5), False), ((0.24, 0.25, 0.25), True)])
+def test_a_difference_that_the_trials_scatter_explains_is_none(errors: tuple[float, ...], told: bool) -> None:
+    """Both have the same mean, beyond 1.5 times the simulated error."""
+    assert ("2.5 times larger" in _errors(*errors)) is told
+    assert ("Do not rely" in _errors(*errors)) is told
 
 
 def test_in_one_plane_a_recovery_is_the_true_one_where_that_is_known() -> None:
