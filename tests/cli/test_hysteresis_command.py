@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import tarfile
 from pathlib import Path
@@ -12,8 +13,10 @@ import pytest
 from tests.cli.conftest import Call
 from tests.identification.made_loops import SHORT, made_loop, written
 from wristctl.cli.former_hysteresis import words_today
+from wristctl.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 from wristctl.simulation.strokes import FrictionCase
+from wristctl.study_files.load import load_study
 
 QUICK = ("ranges_deg=[[0, 10]]", "frequencies=[1, 5]", "angles_deg=[]")
 SET = tuple(word for text in QUICK for word in ("--set", f"hysteresis.{text}"))
@@ -84,6 +87,27 @@ def test_runs_of_the_former_kind_are_repeated(call: Call, sealed_before: dict[st
     code, out, _ = call("runs", "replay", sealed_before[today].id, "--json")
     found = json.loads(out)
     assert code == 0 and found["same"], found
+
+
+def test_the_commands_of_the_page_run_as_written(call: Call) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "hysteresis.md").read_text(encoding="utf-8")
+    typed = re.findall(r"^wristctl (analyse .*)$", page, re.MULTILINE)
+    assert len(typed) >= 3
+    for each in typed:
+        code, _, err = call(*shlex.split(each), "--dry-run")
+        assert code == 0, f"{each}: {err}"
+
+
+def test_angles_of_the_dead_band_that_nobody_gave_follow_the_outer_range() -> None:
+    def angles(*given: str) -> tuple[float, ...]:
+        return load_study(overrides=given).hysteresis.angles_deg
+
+    assert angles() == (5.0, 15.0, 25.0)
+    assert angles("hysteresis.ranges_deg=[[-12, 12], [0, 5]]") == pytest.approx((-8.0, 0.0, 8.0))
+    assert angles("hysteresis.ranges_deg=[[0, 60]]", "hysteresis.angles_deg=[7]") == (7.0,)
+    with pytest.raises(UserError, match="angles_deg: 25 deg") as refused:
+        angles("hysteresis.ranges_deg=[[0, 20]]", "hysteresis.angles_deg=[25]")
+    assert "angles_deg" in refused.value.fix
 
 
 FORMER = {

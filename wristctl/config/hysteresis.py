@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from wristctl.config.plant import Actuator
 from wristctl.config.section import Section, choice, quantity
+from wristctl.errors import Unfitting
 
 Speed = Annotated[float, Field(gt=0, le=20)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -46,7 +47,8 @@ class HysteresisSettings(Section):
     angles_deg: tuple[float, ...] = quantity(
         (5.0, 15.0, 25.0),
         "deg",
-        "where held spools are approached from both ends of the outer range, for the dead band",
+        "where held spools are approached from both ends of the outer range, for the dead band; where they are left "
+        "out: at a sixth, half and five sixths of that range",
     )
     ramp: float = quantity(7.0, "s", "how long that takes", "assumed; below 5 s a wrist arrives with a swing", gt=0)
     segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
@@ -59,9 +61,13 @@ class HysteresisSettings(Section):
             if not high > low:
                 raise ValueError(f"a range goes from a lower to a higher angle, not from {low:g} to {high:g} deg")
         low, high = self.ranges_deg[0]
+        if "angles_deg" not in self.model_fields_set:
+            inside = tuple(low + (high - low) * sixths / 6.0 for sixths in (1, 3, 5))
+            object.__setattr__(self, "angles_deg", inside)
         for angle in self.angles_deg:
             if not low < angle < high:
-                raise ValueError(f"{angle:g} deg lies outside the outer range, {low:g} to {high:g} deg")
+                problem = f"angles_deg: {angle:g} deg lies outside the outer range, {low:g} to {high:g} deg"
+                raise Unfitting(problem, "angles_deg between these; where it is left out it follows ranges_deg")
         return self
 
     def actuator(self, friction: float, sheath: float, presliding: float) -> Actuator:
