@@ -16,6 +16,7 @@ import pytest
 
 from wristctl.commands.export.law import export_law
 from wristctl.errors import UserError
+from wristctl.plugins.trust import asking
 from wristctl.records import start_run
 from wristctl.study_files.load import load_study
 
@@ -171,3 +172,24 @@ def test_runs_hand_over_the_controller_that_they_have(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="is no controller, no study file and no run") as unknown:
         export_law(["pd-fff"], [], None, tmp_path / "results")
     assert "did you mean 'pd-ff'?" in str(unknown.value)
+    with pytest.raises(UserError, match="'pidff' is no controller") as beside_a_study:
+        export_law(["pidff", "mywrist.yaml"], [], None, tmp_path / "results")
+    assert "did you mean 'pid-ff'?" in beside_a_study.value.fix
+
+
+def test_a_run_hands_over_a_controller_of_ones_own_by_the_name_that_it_is_kept_by(tmp_path: Path) -> None:
+    with start_run("tune", load_study(), "", tmp_path / "results") as tuned:
+        own = tuned.file("data/my_own.py")
+        own.write_text(OWN_LAW)
+        for name, controller, gains in (("pid-ff", "pid-ff", "default"), ("my-own", f"{own}:OWN", "lambda=3.5,D=0.03")):
+            kept = tuned.file(f"data/controllers/{name}.yaml")
+            kept.write_text(f"simulate: {{controller: '{controller}', gains: '{gains}', horizon: 0.1}}\n")
+    with asking(lambda shown: True):
+        export_law([tuned.path.name, "my-own"], [], tmp_path / "law", tmp_path / "results")
+    assert "GAIN_lambda = 3.5;" in (tmp_path / "law" / "my_own_law.c").read_text()
+    with pytest.raises(UserError, match="has no my-owm") as mistyped:
+        export_law([tuned.path.name, "my-owm"], [], None, tmp_path / "results")
+    assert "my-own" in mistyped.value.fix
+    for too_many in (("my-own", "pid-ff"), ("pid-ff", "mywrist.yaml")):
+        with pytest.raises(UserError, match="one controller is exported at a time"):
+            export_law([tuned.path.name, *too_many], [], None, tmp_path / "results")

@@ -100,14 +100,20 @@ def export_law(words: Sequence[str], overrides: Sequence[str], folder: Path | No
 def _chosen(words: Sequence[str], overrides: Sequence[str], out: Path) -> tuple[Study, str]:
     """The study whose `simulate` section has loop, controller and gains, and where they are from, in words."""
     files = [Path(word) for word in words if _is_study(word)]
-    controllers = [word for word in words if not _is_study(word) and names_controller(word)]
-    refs = [word for word in words if not _is_study(word) and not names_controller(word)]
-    if len(controllers) > 1 or len(refs) > 1 or (refs and files):
+    others = [word for word in words if not _is_study(word)]
+    refs = [word for word in others if not names_controller(word)]
+    runs = [ref for ref in refs if ref.startswith("latest:") or Path(ref).is_dir() or any(out.glob(f"{ref}*"))]
+    if refs and not runs:
+        listings = "`wristctl list controllers` and `wristctl runs ls` show what there is"
+        fix = f"{meant(refs[0], CONTROLLERS.known())}; {listings}"
+        raise UserError(f"'{refs[0]}' is no controller, no study file and no run in {out}", refs[0], fix)
+    controllers = [word for word in others if word not in runs]
+    if len(controllers) > 1 or len(runs) > 1 or (runs and files):
         raise UserError(
             "one controller is exported at a time", " ".join(words), "a controller with study files, or a run"
         )
-    if refs:
-        return _of_run(_run(refs[0], out), controllers[0] if controllers else None, overrides)
+    if runs:
+        return _of_run(require(runs[0], None, out), controllers[0] if controllers else None, overrides)
     typed = [f"{key}={value}" for word in controllers for key, value in row_typed(word).items()]
     study = load_study(files, [*(f"simulate.{each}" for each in typed), *overrides], "simulate")
     return study, f"of {', '.join(map(str, files))}" if files else "of the default wrist"
@@ -116,15 +122,6 @@ def _chosen(words: Sequence[str], overrides: Sequence[str], out: Path) -> tuple[
 def _is_study(word: str) -> bool:
     study = study_file(Path(word))
     return word.endswith(STUDIES) or (not names_controller(word) and study is not None and study.is_file())
-
-
-def _run(ref: str, out: Path) -> Run:
-    if not (ref.startswith("latest:") or Path(ref).is_dir() or any(out.glob(f"{ref}*"))):
-        fix = (
-            f"{meant(ref, CONTROLLERS.known())}; `wristctl list controllers` and `wristctl runs ls` show what there is"
-        )
-        raise UserError(f"'{ref}' is no controller, no study file and no run in {out}", ref, fix)
-    return require(ref, None, out)
 
 
 def _of_run(run: Run, controller: str | None, overrides: Sequence[str]) -> tuple[Study, str]:
