@@ -76,15 +76,15 @@ _log = logging.getLogger(__name__)
 
 
 @in_python()
-def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool = False) -> Study:
+def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool = False, force: bool = False) -> Study:
     """The study of a YAML file, of an experiment by its name ("quick"), or of defaults only.
 
     `overrides` such as "wrist.length=0.09" win over the file, later ones over earlier ones; quantities are in the
     units that `wristctl COMMAND --dry-run --all` shows: SI, but for suffixes like _deg. Raises UserError for an
-    unknown key or a value that cannot be, with file and line, and what was meant. `trust_code` lets the code run that
-    a run carries.
+    unknown key or a value that cannot be, with file and line, and what was meant; and, but for `force`, for a size that
+    cannot well be meant, as a length in millimetres. `trust_code` lets the code run that a run carries.
     """
-    return _load_study([Path(file)] if file else [], list(overrides), trust_code=trust_code)
+    return _load_study([Path(file)] if file else [], list(overrides), trust_code=trust_code, force=force)
 
 
 @in_python()

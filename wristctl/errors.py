@@ -83,8 +83,8 @@ class Keyword(Setting):
 
     @property
     def typed(self) -> str:
-        """The same: the command line has no such setting."""
-        return self.in_python
+        """The same, where the command line has no option for it."""
+        return self.option or self.in_python
 
 
 @dataclass(frozen=True)

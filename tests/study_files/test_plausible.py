@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+import wristctl
+from wristctl.commands.loop_warnings import asked_by, out_of_reach
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.study_files.error_messages import check_sizes
+from wristctl.study_files.keys import field_at, unit_of
 from wristctl.study_files.load import read_study
+from wristctl.study_files.sweeps import check_all_sizes
 
 ASKED = {
     "wrist.length=80": "80 m is 1,000 times the usual: did you mean 0.08?",
@@ -38,7 +48,14 @@ def test_what_may_be_meant_is_not(given: str) -> None:
 
 
 SIZES = {
-    "wrist.stiffness": (1e-3, 1e3),
+    "wrist.stiffness": (1e-3, 1e2),
+    "simulate.loop.plant.stiffness": (1e-3, 1e2),
+    "simulate.loop.stiffness": (1e-3, 1e3),
+    "wrist.damping": (None, 10.0),
+    "wrist.mass": (None, 20.0),
+    "wrist.hand_mass": (None, 20.0),
+    "simulate.loop.disturbances.grasp.mass": (None, 20.0),
+    "hw-run.payload": (None, 20.0),
     "wrist.tension_limit": (0.1, 1e4),
     "simulate.loop.disturbances.load": (None, 1e3),
     "simulate.loop.disturbances.push.force": (None, 1e3),
@@ -50,7 +67,8 @@ SIZES = {
 @pytest.mark.parametrize("key", SIZES)
 def test_a_size_by_far_out_of_the_usual_is_asked_about_and_the_last_one_within_is_not(key: str) -> None:
     least, most = SIZES[key]
-    slack, unit = "wrist.pretension=0.01", "N m" if key.endswith("safety.load") else "N"
+    _, field = field_at(tuple(key.split(".")))
+    slack, unit = "wrist.pretension=0.01", re.escape(unit_of(field)) if field else ""
     for within in (most, 1e-6 if least is None else least):
         check_sizes(*read_study([], [slack, f"{key}={within}"]))
     for beyond in (1.01 * most, *([] if least is None else [0.99 * least])):
@@ -67,3 +85,39 @@ def test_a_force_to_the_other_side_is_as_large_and_none_is_no_size() -> None:
         check_sizes(*read_study([], [f"{key}=-1010"]))
     with pytest.raises(UserError, match="give it in metres"):
         check_sizes(*read_study([], ["wrist.length=80"]))
+
+
+GRAMS: Any = {"wrist": {"hand_mass": 200.0}, "horizon": 0.01}
+
+
+def test_python_asks_as_the_command_does_and_goes_on_with_a_study_that_was_loaded_by_force(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"95 m is 1,188 times the usual: did you mean 0\.095") as refused:
+        wristctl.simulate(wrist={"length": 95.0})
+    assert "load_study(..., force=True)" in refused.value.fix and "--force" not in refused.value.fix
+    file = tmp_path / "grams.yaml"
+    file.write_text("wrist: {hand_mass: 200}\nsimulate: {horizon: 0.01}\n")
+    for asked in (lambda: wristctl.load_study(file), lambda: wristctl.simulate(file), lambda: wristctl.tune(**GRAMS)):
+        with pytest.raises(UserError, match="200 kg is not between 0 and 20") as of_grams:
+            asked()
+        assert "give it in kg" in of_grams.value.fix
+    study: Study = wristctl.load_study(file, force=True)
+    assert wristctl.simulate(study, horizon=0.02).trajectory.theta.size > 0
+
+
+def test_values_of_a_sweep_are_asked_about_where_the_command_makes_it() -> None:
+    for axis in ("wrist.length=60..140:5", "wrist.length=0.08,80", "loop.plant.length=~70..90:3"):
+        with pytest.raises(UserError, match="times the usual") as refused:
+            check_all_sizes(*read_study([], [f"sweep=['{axis}']"], "simulate"), "simulate")
+        assert axis in refused.value.where
+    for meant in ("wrist.length=0.06..0.14:5", "loop.plant.length=x0.9,x1.1", "controller=pid,adrc", "seed=1,200"):
+        check_all_sizes(*read_study([], [f"sweep=['{meant}']"], "simulate"), "simulate")
+    check_all_sizes(*read_study([], ["sweep=['wrist.length=60..140:5']"]), "hw-run")
+    with pytest.raises(UserError, match="60 m"):
+        wristctl.simulate(sweep=["wrist.length=60,70"])
+
+
+def test_a_wrist_that_no_tension_holds_is_warned_of_by_what_would_do() -> None:
+    (shortfall,) = out_of_reach(WristParameters(length=95.0), asked_by(Study(), Study().simulate))
+    assert "tendon_radius" in shortfall.fix and "tension_limit" not in shortfall.fix
+    (heavy,) = out_of_reach(WristParameters(hand_mass=20.0), asked_by(Study(), Study().simulate))
+    assert "tension_limit" in heavy.fix

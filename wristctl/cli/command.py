@@ -132,8 +132,9 @@ def _perform(
     from wristctl.cli.output import print_plan, print_result
     from wristctl.cli.progress import PLAIN, Bar, listening
     from wristctl.commands.perform import check_executor, perform, prepare, recording
-    from wristctl.study_files.error_messages import check_sizes, located
+    from wristctl.study_files.error_messages import located
     from wristctl.study_files.load import read_study
+    from wristctl.study_files.sweeps import check_all_sizes
 
     typed_controllers, named_files = parted(options.files or (), procedure.kind)
     files = [*named_files, *(options.config or ())]
@@ -141,7 +142,7 @@ def _perform(
     overrides = [*(options.override or ()), *shortcuts, *seed]
     study, origins = read_study(files, overrides, procedure.kind, controllers=typed_controllers, tune=TUNE in flags)
     if not options.force:
-        check_sizes(study, origins)
+        check_all_sizes(study, origins, procedure.kind)
     with listening(options.quiet, options.verbose) as console:
         try:
             prepared = prepare(procedure, study, options.out, files=files, origins=origins)

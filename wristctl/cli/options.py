@@ -152,8 +152,8 @@ class Options:
         bool,
         typer.Option(
             "--force",
-            help="Go on with lengths hardly meant in metres; tune: beyond what tendons hold; hw-run: with gains that "
-            "may swing.",
+            help="Go on with sizes that are hardly meant, as a length of 80 m; tune: beyond what tendons hold; "
+            "hw-run: with gains that may swing.",
             rich_help_panel=ADVANCED,
         ),
     ] = False

@@ -313,7 +313,9 @@ def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | N
         f"the tendons cannot hold {math.degrees(short.theta):.3g} deg, which asks for {abs(short.asked):.3g} N m where "
         f"{wrist.tension_limit:g} N give {abs(short.given):.3g}"
     )
-    way = [f"a tension_limit of {_rounded(short.tension_limit, math.ceil):.3g} N"]
+    way = []
+    if short.tension_limit > 0.0:
+        way.append(f"a tension_limit of {_rounded(short.tension_limit, math.ceil):.3g} N")
     if abs(short.angle) > 0.0:  # nan where they do not hold it straight
         way.append(f"at most {_rounded(math.degrees(abs(short.angle)), math.floor):.3g} deg")
     way.append(f"a tendon_radius of {_rounded(short.tendon_radius, math.ceil):.3g} m")

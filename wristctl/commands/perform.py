@@ -32,6 +32,7 @@ from wristctl.records.run_writer import Undrawn
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import read_study
 from wristctl.study_files.strict_yaml import KeyPath
+from wristctl.study_files.sweeps import check_all_sizes
 from wristctl.work.executors import Workers
 
 # Laws that a listing names.
@@ -202,10 +203,16 @@ def check_executor(named: str) -> None:
 def study_with(
     study: StudyOrFile | None, command: str, settings: Mapping[str, Any]
 ) -> tuple[Study, Mapping[KeyPath, Phrase]]:
-    """A study, or that of a file, with `settings` on top, and where each key is from. Raises UserError."""
-    if isinstance(study, Study):
-        return read_study(command=command, keywords=settings, base=study) if settings else (study, {})
-    return read_study([Path(study)] if study is not None else [], command=command, keywords=settings)
+    """A study, or that of a file, with `settings` on top, and where each key is from. Raises UserError.
+
+    Sizes that cannot well be meant are refused in a file and in settings; those of a study are meant.
+    """
+    base, files = (study, []) if isinstance(study, Study) else (None, [Path(study)] if study is not None else [])
+    if base is not None and not settings:
+        return base, {}
+    whole, origins = read_study(files, command=command, keywords=settings, base=base)
+    check_all_sizes(whole, origins, command)
+    return whole, origins
 
 
 def carry_out(

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import Phrase, Setting, UserError, meant, nearest
+from wristctl.errors import Keyword, Phrase, Setting, UserError, meant, nearest
 from wristctl.study_files.keys import field_at, keys_of, unit_of
 from wristctl.study_files.strict_yaml import KeyPath
 
@@ -176,29 +176,36 @@ _USUAL = {name: field.default for name, field in _BELIEVED.items()}
 _USUAL["radius"] = _USUAL["tendon_radius"]
 
 
-# Sizes of leaves that are no lengths, beyond which they are asked about; in their units.
+# Sizes of leaves that are no lengths, beyond which they are asked about; in their units. Other springs than the wrist's
+# own count what elastic tendons add.
 _SENSIBLE = {"stiffness": (1e-3, 1e3), "force": (0.0, 1e3), "load": (0.0, 1e3), "tension_limit": (0.1, 1e4)}
+_SENSIBLE |= dict.fromkeys(("wrist.stiffness", "plant.stiffness"), (1e-3, 1e2)) | {"damping": (0.0, 10.0)}
+_SENSIBLE |= dict.fromkeys(("mass", "hand_mass", "payload"), (0.0, 20.0))
+_FORCE = Keyword("..., force=True", option="--force", function="load_study")
 
 
 def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
-    """UserError, with what may have been meant, for a length, stiffness or force that cannot well be meant."""
+    """UserError, with what may have been meant, for a length, mass, stiffness, damping or force that is hardly one."""
     for path, where in _with_items(study, origins):
-        _, field = field_at(path)
-        unit, name = unit_of(field) if field is not None else "", str(path[-1])
-        value = _at(study, path) if unit else None
-        if field is None or not isinstance(value, float | int):
-            continue
-        place: Phrase = (where, f": {'.'.join(map(str, path))}")
-        if unit == "m":
-            usual = _USUAL.get(name) if field.default is None else field.default
-            if isinstance(usual, float) and 0.0 < _TIMES * usual < abs(value):
-                meant = _meant(float(value), usual, field.default is None and name in _BELIEVED)
-                problem = f"{value:g} m is {value / usual:,.0f} times the usual: {meant}"
-                raise UserError(problem, place, "give it in metres, or go on with --force")
-        low, high = _SENSIBLE.get(name, (0.0, math.inf))
-        if value != 0.0 and not low <= abs(value) <= high:
-            problem = f"{value:g} {unit} is not between {low:g} and {high:g}"
-            raise UserError(problem, place, "is that meant? go on with --force")
+        check_size(path, _at(study, path), (where, f": {'.'.join(map(str, path))}"))
+
+
+def check_size(path: KeyPath, value: Any, where: Phrase) -> None:
+    """UserError, as of check_sizes, for the value of a leaf; what is no number passes."""
+    _, field = field_at(path)
+    unit, name = unit_of(field) if field is not None else "", str(path[-1])
+    if field is None or not unit or not isinstance(value, float | int):
+        return
+    if unit == "m":
+        usual = _USUAL.get(name) if field.default is None else field.default
+        if isinstance(usual, float) and 0.0 < _TIMES * usual < abs(value):
+            meant = _meant(float(value), usual, field.default is None and name in _BELIEVED)
+            problem = f"{value:g} m is {value / usual:,.0f} times the usual: {meant}"
+            raise UserError(problem, where, ("give it in metres, or go on with ", _FORCE))
+    low, high = _SENSIBLE.get(".".join(map(str, path[-2:])), _SENSIBLE.get(name, (0.0, math.inf)))
+    if value != 0.0 and not low <= abs(value) <= high:
+        problem = f"{value:g} {unit} is not between {low:g} and {high:g}"
+        raise UserError(problem, where, (f"is that meant? give it in {unit}, or go on with ", _FORCE))
 
 
 def _with_items(study: Study, origins: Mapping[KeyPath, Phrase]) -> Iterator[tuple[KeyPath, Phrase]]:

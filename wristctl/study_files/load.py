@@ -1,6 +1,7 @@
 """Read a study from files and overrides; every error says where it stands and how to mend it."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +18,7 @@ from wristctl.errors import Keyword, Phrase, Setting, UserError, fix_to_read, me
 from wristctl.plain_files import read_plain
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
-from wristctl.study_files.error_messages import explained
+from wristctl.study_files.error_messages import check_sizes, explained
 from wristctl.study_files.keys import field_at, keys_of, section_keys, whole_key
 from wristctl.study_files.keywords import as_a_file_has_it, keyword, path_of
 from wristctl.study_files.renaming import (
@@ -40,7 +41,11 @@ _NAMED = 5
 
 
 def load_study(
-    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None, trust_code: bool = False
+    files: Sequence[Path] = (),
+    overrides: Sequence[str] = (),
+    command: str | None = None,
+    trust_code: bool = False,
+    force: bool = True,
 ) -> Study:
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
 
@@ -48,13 +53,14 @@ def load_study(
     the section of `command`: for train, `epochs=5` is `train.epochs=5`. It may be of no section that `command` does not
     read; files may hold any. With `trust_code` the code of runs that the
     study names may be loaded, now and later. Raises UserError with file and line (or override), key path, and nearest
-    key or what is expected.
+    key or what is expected; without `force` also for a size that cannot well be meant.
     """
-    if not trust_code:
-        return read_study(files, overrides, command)[0]
-    with asking(lambda shown: True):
-        study = read_study(files, overrides, command)[0]
-        check_trust(tuple(name for _, name in named_by(study)))
+    with asking(lambda shown: True) if trust_code else nullcontext():
+        study, origins = read_study(files, overrides, command)
+        if not force:
+            check_sizes(study, origins)
+        if trust_code:
+            check_trust(tuple(name for _, name in named_by(study)))
     return study
 
 

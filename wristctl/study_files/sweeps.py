@@ -15,11 +15,11 @@ from wristctl.config.foreign import is_reference
 from wristctl.config.former_names import LOOPS, key_today
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.study import Study
-from wristctl.errors import Argument, UserError, meant
-from wristctl.study_files.error_messages import fault_of
+from wristctl.errors import Argument, Phrase, UserError, meant
+from wristctl.study_files.error_messages import check_size, check_sizes, fault_of
 from wristctl.study_files.keys import keys_of, unit_of, whole_key
-from wristctl.study_files.resolved import check_read
-from wristctl.study_files.strict_yaml import parse_yaml
+from wristctl.study_files.resolved import check_read, sections_read
+from wristctl.study_files.strict_yaml import KeyPath, parse_yaml
 
 MOST_POINTS = 1_000_000
 _EXAMPLE = "KEY=1,2,3 or KEY=0.05..0.12:20, KEY=8e3..4e4 log:20, KEY=~0..3:100, KEY=~normal(0.6, 0.05):100"
@@ -66,6 +66,15 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
             raise UserError(problem, Argument("sweep", text), "fewer values, or drawn ones with ~ in place of all")
         axes.append(SweepAxis(name, _values(text, values, name, study.seed), counted[-1][1], text))
     return axes
+
+
+def check_all_sizes(study: Study, origins: Mapping[KeyPath, Phrase], command: str) -> None:
+    """UserError, as of check_sizes, for what was given, and for the values of a sweep that the command makes."""
+    check_sizes(study, origins)
+    for axis in axes_of(study, command) if "sweep" in sections_read(command) and ("sweep",) in origins else ():
+        sizes = [value for value in axis.values if isinstance(value, float | int) and value != 0.0]
+        for value in (min(sizes, key=abs), max(sizes, key=abs)) if sizes else ():
+            check_size(axis.path, value, axis.where)
 
 
 def points_of(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:

@@ -153,7 +153,7 @@ class Shortfall(NamedTuple):
     angle: float
     """Angle toward theta to which they hold it, from straight [rad]; nan where they do not hold it straight."""
     tension_limit: float
-    """Least limit of each tendon's tension that would do [N]."""
+    """Least limit of each tendon's tension that would do [N]; negative where none would."""
     tendon_radius: float
     """Least radius of the circle of tendons that would do [m]."""
 
