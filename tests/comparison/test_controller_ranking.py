@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -171,6 +172,8 @@ def test_more_repetitions_than_motions_are_what_is_compared() -> None:
     assert found.cases == "12 repetitions" and found.standing.groups == [[0], [1]] and found.motions == 2
     np.testing.assert_allclose(found.scores, [np.sqrt(own[0] * own[1]) for own in rmse.values()])
     assert found.means[0].value == pytest.approx(np.exp(np.log(rmse["a/x"]).mean()))
+    (setting,) = re.findall(r"repetitions=\d+", found.more)
+    assert load_study(None, f"compare.{setting}").compare.repetitions > 1 and "--" not in found.more
 
 
 def test_too_few_motions_rank_nothing_whatever_the_difference() -> None:

@@ -148,7 +148,7 @@ class Ranking:
     @property
     def more(self) -> str:
         """What would tell rows apart that these cases do not, in words."""
-        return "more worlds" if self.unit == "world" else "more motions or --repetitions"
+        return "more worlds" if self.unit == "world" else "more motions or the setting repetitions=5"
 
     @cached_property
     def means(self) -> list[GeometricMean]:
