@@ -77,3 +77,11 @@ def test_a_file_may_hold_sections_of_other_commands(tmp_path: Path) -> None:
 
 def test_what_a_recommendation_hands_on_may_be_set() -> None:
     assert load_study([], ["hw-run.repetitions=2"], "recommend").hw_run.repetitions == 2
+
+
+def test_the_budget_of_a_comparisons_own_search_is_named_by_its_key() -> None:
+    with pytest.raises(UserError, match=r"compare does not read tune\.candidates") as refused:
+        load_study(overrides=["tune.candidates=8"], command="compare")
+    key = refused.value.fix.partition(":")[0]
+    tuning = load_study(overrides=[f"{key}=8"], command="compare").compare.tuning
+    assert tuning is not None and tuning.candidates == 8

@@ -37,6 +37,8 @@ _READ["analyse"] += ("hysteresis",)
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 _UNREAD = {"loop": ("hysteresis",), "hysteresis": ("simulate", _OWN)}
 """What `analyse` leaves alone of them, by what it is of."""
+_WITHIN = {("compare", "tune"): "compare.tuning"}
+"""What a command has of its own in place of another's section."""
 _PASSED_ON: dict[str, tuple[str, ...]] = {"recommend": ("simulate", "hw-run"), "calibrate-camera": ("track",)}
 """Sections whose settings go into the files that a command writes: the study of a recommendation, printed markers."""
 
@@ -59,6 +61,8 @@ def check_read(key: str, command: str, where: Phrase) -> None:
     readers = [command_of(name) for name in commands if section in _keys(name)]
     read = f"`{'`, `'.join(f'wristctl {reader}' for reader in readers)}` read{'s' * (len(readers) == 1)} it"
     fix = f"{read}; a study file may hold it beside what {command_of(command)} reads"
+    if within := _WITHIN.get((command, section)):
+        fix = f"{within}{key.removeprefix(section)}: the search that {command} makes itself, of gains: tuned; {fix}"
     raise UserError(f"{command_of(command)} does not read {key}", where, fix)
 
 
