@@ -9,8 +9,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -19,6 +20,8 @@ from tests.cli.test_app import every_command
 from tests.doors.carrier import CARRIED, carrier
 from wristctl.__main__ import _INTERRUPTED
 from wristctl.cli import app
+from wristctl.commands.gen_data.command import GEN_DATA
+from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import list_runs, start_run
@@ -145,6 +148,24 @@ def test_an_interrupted_run(begin: Callable[..., subprocess.Popen[bytes]], tmp_p
     _is_error(shown := _one_object(out.decode()), "interrupted", 130)
     assert child.returncode == 130 and shown["where"] == f"results/{run.id}" and run.state == "interrupted"
     assert shown["fix"] == f"what was found: wristctl runs show results/{run.id}" and shown["fix"] in err.decode()
+
+
+@pytest.mark.parametrize("some", [False, True])
+def test_an_interrupted_command_says_whether_anything_was_found(
+    call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, some: bool
+) -> None:
+    def interrupted(session: Session) -> NoReturn:
+        if some:
+            session.findings.metric("rmse", 1.0)
+        session.findings.keep_overview()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("wristctl.commands.gen_data.command.GEN_DATA", replace(GEN_DATA, perform=interrupted))
+    code, out, _ = call("gen-data", "--json")
+    (run,) = list_runs(tmp_path / "results")
+    fix = _one_object(out)["fix"]
+    assert code == 130 and (f"wristctl runs show results/{run.id}" in fix) == some
+    assert ("nothing was found" in fix and f"wristctl runs rm results/{run.id}" in fix) != some
 
 
 def test_an_interrupted_verb(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -169,7 +169,9 @@ def _perform(
                 raise
             place, resumes = shlex.quote(str(run.path)), any(need.leaf == "resume" for need in procedure.needs)
             go_on = f"go on: wristctl {procedure.kind} {place}/config.yaml --resume {place}"
-            remark = go_on if resumes else f"what was found: wristctl runs show {place}"
+            anew = f"nothing was found: the same command begins anew; delete this: wristctl runs rm {place}"
+            found = f"what was found: wristctl runs show {place}" if run.has_found else anew
+            remark = go_on if resumes else found
             console.print(f"interrupted; {remark}", **PLAIN)
             raise Interrupted(str(run.path), remark) from interruption
         except UserError as error:

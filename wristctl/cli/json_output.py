@@ -19,7 +19,7 @@ class Shown(UserError):
 
 
 class Interrupted(UserError):
-    """Ctrl-C in a command that has told where what was found is, and how to go on."""
+    """Ctrl-C in a command that has told where what was found is, if anything was, and how to go on."""
 
     def __init__(self, where: str = "", fix: str = "") -> None:
         super().__init__("interrupted", where, fix, 130)

@@ -27,6 +27,7 @@ from wristctl.records.manifest import (
     EVENTS,
     MANIFEST,
     METRICS,
+    OVERVIEW,
     PACKAGES,
     PATCH,
     README,
@@ -154,6 +155,12 @@ class LiveRun:
         """Entropy of the random stream `name` for `numpy.random.default_rng`, noted in the manifest."""
         self._manifest.streams[name] = stream(self._manifest.seed, name)
         return self._manifest.streams[name]
+
+    @property
+    def has_found(self) -> bool:
+        """Whether it holds a metric, or an output other than the head of its page, by now."""
+        written = (name for name in self._handed if name != OVERVIEW)
+        return bool(self._metrics) or any((self.path / name).is_file() for name in written)
 
     def table(
         self,
