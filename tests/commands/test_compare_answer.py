@@ -388,6 +388,12 @@ def test_nothing_that_is_usable_is_told() -> None:
     assert "use none of these" in told(stands(rmse=rows, swings=tuple(rows)))
 
 
+def test_who_has_a_wrist_of_their_own_is_not_told_how_to_begin_one() -> None:
+    rows = {"a/default": 1e-3, "b/default": 1e-2}
+    theirs, default = (str(answer_of([stands(rmse=rows)], own_wrist=own)) for own in (True, False))
+    assert "wristctl init" in default and "wristctl init" not in theirs
+
+
 def test_no_comparison_has_no_answer() -> None:
     assert answer_of([]) is None and answer_tables([]) == []
 

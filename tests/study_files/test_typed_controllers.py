@@ -127,6 +127,24 @@ def test_rows_are_as_typed_in_their_order_before_those_of_files(folder: Path) ->
     assert study.terms and {row for pair in study.terms.values() for row in pair} == {"pid-ff/tuned", "pd-ff/tuned"}
 
 
+def test_controllers_of_a_file_that_are_left_out_are_told_in_one_note(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    listed = "[pid-ff/hardware, my.py:MINE, {controller: pid, gains: {Kp: 1, Ki: 2, Kd: 0}}]"
+    (folder / "mywrist.yaml").write_text(f"compare: {{controllers: {listed}}}\ntune: {{controllers: [smc, pid]}}\n")
+    settings_of("compare", "mywrist.yaml", "ct-dob", "pid-ff/hardware")
+    (note,) = caplog.messages
+    assert "my.py:MINE" in note and "pid/given" in note and "pid-ff" not in note and str(folder) not in note
+    caplog.clear()
+    settings_of("tune", "mywrist.yaml", "pid", "pid-ff")
+    assert ["smc" in note and "pid" not in note for note in caplog.messages] == [True]
+    caplog.clear()
+    settings_of("compare", "mywrist.yaml")
+    settings_of("compare", "other.yml", "pid-ff")
+    settings_of("tune", "mywrist.yaml", "pid", "smc")
+    assert not caplog.messages
+
+
 def test_a_list_in_a_file_is_typed_the_same_way(folder: Path) -> None:
     (folder / "mywrist.yaml").write_text("compare: {controllers: [pid-ff, adrc/hardware, my.py:MINE]}\n")
     assert rows_of(settings_of("compare", "mywrist.yaml")) == rows_of(

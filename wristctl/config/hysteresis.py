@@ -63,7 +63,7 @@ class HysteresisSettings(Section):
         low, high = self.ranges_deg[0]
         if "angles_deg" not in self.model_fields_set:
             inside = tuple(low + (high - low) * sixths / 6.0 for sixths in (1, 3, 5))
-            object.__setattr__(self, "angles_deg", inside)
+            self.__dict__["angles_deg"] = inside
         for angle in self.angles_deg:
             if not low < angle < high:
                 problem = f"angles_deg: {angle:g} deg lies outside the outer range, {low:g} to {high:g} deg"

@@ -1,6 +1,7 @@
 """Controllers that are typed among study files: `wristctl compare pid-ff adrc/hardware my.py:LAW mywrist.yaml`."""
 
 import ast
+import logging
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +21,9 @@ TAKE_CONTROLLERS = ("compare", "hw-run", "tune", "recommend", "study")
 _SEARCHING = ("tune", "recommend", "study")
 STUDIES = (".yaml", ".yml")
 """Ends of the names of study files."""
+# Controllers of a study that a note names.
+_NAMED = 5
+log = logging.getLogger(__name__)
 
 
 class Typed(NamedTuple):
@@ -189,6 +193,17 @@ def _settle_tuning(
     origins[*place, "controllers"] = "--tune" if tune else ", ".join(names)
 
 
+def _labels(entries: Iterable[Any]) -> dict[str, str]:
+    """Labels of rows, or of names alone, with those to show, in which own code has no folder."""
+    labels = {}
+    for entry in entries:
+        row = entry if isinstance(entry, dict) else {"controller": entry, "gains": BY_LOOP}
+        name, gains = str(row.get("controller", "")), row.get("gains", "default")
+        gains = gains if isinstance(gains, str) else "given"
+        labels[label_of(name, gains)] = label_of(Path(name).name, gains)
+    return labels
+
+
 def _replace(
     section: dict[str, Any],
     origins: dict[KeyPath, Phrase],
@@ -196,7 +211,15 @@ def _replace(
     arguments: Sequence[str],
     entries: Sequence[Any],
 ) -> None:
-    """Put entries of a list in place of what a section had, each with the argument that it is from."""
+    """Put entries of a list in place of what a section had, each with the argument that it is from.
+
+    A note names what of the section is left out.
+    """
+    listed, new = section.get(str(place[-1])), _labels(entries)
+    old = _labels(listed) if isinstance(listed, tuple) else {}
+    if left := [old[label] for label in old if label not in new]:
+        more = f" and {len(left) - _NAMED} more" * (len(left) > _NAMED)
+        log.warning("left out of the study: %s%s; what is typed takes the place", ", ".join(left[:_NAMED]), more)
     forget(origins, place)
     section[str(place[-1])] = tuple(entries)
     origins.setdefault(place[:1], " ".join(arguments))

@@ -43,12 +43,13 @@ def answer_of(
     gains: Mapping[str, Mapping[str, float]] | None = None,
     bending: str = "",
     asked: Collection[str] = (),
+    own_wrist: bool = False,
 ) -> Answer | None:
     """The answer of a comparison for one screen; None where nothing was compared.
 
     `run` is its path, empty for a result in memory; `gains` are those of every row by its label, in SI units; `bending`
     says in which planes all loops bend, where these are two; the table has the labels that were `asked` for, however
-    many others there are.
+    many others there are; `own_wrist` is whether the study has another wrist than the default one.
     """
     if not rankings:
         return None
@@ -64,7 +65,7 @@ def answer_of(
         papers_order(rankings),
         f"{certainty(rankings)} {decided(rankings)}".strip(),
         gains_meant(rankings),
-        "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).",
+        "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist)." * (not own_wrist),
     ]
     return Answer(advice(rankings), controllers_table(rankings, names, asked), more=more).fitted(notes)
 

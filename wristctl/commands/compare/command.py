@@ -36,6 +36,7 @@ from wristctl.commands.tune.command import planned_search
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, under
 
 log = logging.getLogger(__name__)
@@ -88,7 +89,8 @@ class Compared(StudyResult):
         bending = why_two_planes(self.study.wrist, asked_of_comparison(self.study))
         own = [row.label for row in self.study.compare.rows if CONTROLLERS.origin(row.controller)]
         typed = [row.label for row in self.study.compare.rows if row.gains == BY_LOOP]
-        return answer_of(self.rankings, self.place, self.gains, bending, [*own, *typed])
+        own_wrist = self.study.wrist != WristParameters() or self.study.compare.from_identified is not None
+        return answer_of(self.rankings, self.place, self.gains, bending, [*own, *typed], own_wrist)
 
     @property
     def marks(self) -> list[str]:
