@@ -340,10 +340,10 @@ def runs(
 ) -> pd.DataFrame:  # fmt: skip
     """The run directories of the folder `out` as a table, oldest first: one row each, its metrics among the columns.
 
-    `where` are conditions on metrics such as "rmse<1e-3"; `kind` and `label` may be patterns with `*`; `state` is how a
-    run ended, `tag` one that it has; `newer` and `older` are ages: 30m, 12h, 2d; `sort` is a column, `reverse` puts the
-    largest or newest first. Raises UserError for a condition or age that cannot be read, a metric that no run has, or a
-    folder that cannot be read.
+    `where` are conditions on metrics such as "rmse<1e-3", in SI as the columns are, or with the unit: "rmse<0.5deg";
+    `kind` and `label` may be patterns with `*`; `state` is how a run ended, `tag` one that it has; `newer` and `older`
+    are ages: 30m, 12h, 2d; `sort` is a column, `reverse` puts the largest or newest first. Raises UserError for a
+    condition or age that cannot be read, a metric that no run has, or a folder that cannot be read.
     """
     import pandas as pd
 

@@ -80,6 +80,32 @@ def test_a_metric_stands_once_in_each_row(call: Call, asked: tuple[str, ...], sh
 PLAIN = ("id", "kind", "state", "wall [s]")
 
 
+def test_metrics_stand_in_the_units_that_people_read(call: Call) -> None:
+    for label, unit in (("angle", "rad"), ("time", "s")):
+        with start_run("tune", Study(), label) as live:
+            live.metric("best", 0.1, unit)
+            live.metric("rmse", 0.1, "rad")
+            live.metric("tip_mm", 0.1, "mm")
+            live.metric("missing", 0.1, "1")
+            live.file("overview.json").write_text(json.dumps({"cards": ["rmse"]}))
+    assert [line[-13:] for line in call("runs", "ls")[1].splitlines()[2:]] == ["rmse 5.73 deg"] * 2
+    listed = [
+        line.split() for line in call("runs", "ls", "--columns", "label,best,rmse,tip_mm,missing")[1].splitlines()
+    ]
+    assert listed[0] == ["label", "best", "rmse", "[deg]", "tip_mm", "missing"]
+    assert [row[1:] for row in listed[2:]] == [
+        ["5.73", "deg", "5.73", "0.1", "0.1"],
+        ["0.1", "s", "5.73", "0.1", "0.1"],
+    ]
+    assert call("runs", "ls", "--where", "rmse<5.7")[1] == "no runs in results that meet this\n"
+    for asked in ("rmse<5.8", "rmse<5.8deg", "rmse<0.11rad"):
+        head, *_ = call("runs", "ls", "--where", asked)[1].splitlines()
+        assert head.endswith("rmse [deg]"), asked
+    _, out, _ = call("runs", "ls", "--where", "rmse<5.8", "--json")
+    (kept, _) = json.loads(out)["runs"]
+    assert kept["metrics"]["rmse"] == 0.1 and kept["units"]["rmse"] == "rad", "programs read what files hold"
+
+
 @pytest.mark.parametrize(
     ("asked", "shown"),
     [

@@ -25,8 +25,8 @@ def made(tmp_path: Path) -> tuple[Run, Run]:
 
 def test_ls_shows_what_was_asked_for(call: Call, made: tuple[Run, Run]) -> None:
     data, network = made
-    code, out, _ = call("runs", "ls", "--where", "rmse<1.5")
-    assert code == 0 and network.id in out and data.id not in out and "rmse" in out.splitlines()[0]
+    code, out, _ = call("runs", "ls", "--where", "rmse<90")
+    assert code == 0 and network.id in out and data.id not in out and out.splitlines()[0].endswith("rmse [deg]")
     listed = json.loads(call("runs", "ls", "--sort", "rmse", "--json")[1])["runs"]
     assert [each["id"] for each in listed] == [network.id, data.id]
     assert listed[0]["inputs"] == [data.id] and listed[0]["metrics"] == {"rmse": 1.0}
@@ -47,10 +47,10 @@ def test_diff_names_each_part_that_differs(call: Call, made: tuple[Run, Run]) ->
     assert found["metrics"] == {"rmse": {"before": 2.0, "after": 1.0}}
     assert found["code"] == found["environment"] == {}
     out = call("runs", "diff", data.id, network.id, "--all")[1]
-    assert "rmse         2      1      -1         -50" in out
+    assert "rmse     114.6   57.3   -57.3         -50  deg" in out
     assert f"before  {data.id}\nafter   {network.id}\n" in out
     out = call("runs", "diff", network.id, data.id, "--all")[1]
-    assert "rmse         1      2       1         100" in out
+    assert "rmse      57.3  114.6    57.3         100  deg" in out
     inputs = json.loads(call("runs", "diff", network.id, data.id, "--json")[1])["inputs"]
     assert inputs == {"data": {"before": data.result_hash, "after": None}}
     assert "nothing differs" in call("runs", "diff", data.id, data.id)[1]

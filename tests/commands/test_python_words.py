@@ -42,7 +42,7 @@ WRONG: list[tuple[Wrong, str]] = [
     (lambda: wristctl.simulate(study(), label="a/b", out="here"), "label='a/b' - fix: shorten or respell it"),
     (lambda: wristctl.simulate(study(), out="/dev/null/x"), "fix: choose a folder you can write to with out=..."),
     (lambda: wristctl.open_run("no/where"), "fix: name a run that `wristctl.runs()` shows"),
-    (lambda: wristctl.runs("rmse<"), "where='rmse<' - fix: for example where='rmse<1e-3'"),
+    (lambda: wristctl.runs("rmse<"), "where='rmse<' - fix: for example where='rmse<0.5deg'"),
     (lambda: wristctl.runs(newer="2x"), "not an age - newer='2x'"),
     (lambda: wristctl.load_study(None, "wrist.lenght=1"), "load_study(..., 'wrist.lenght=1')"),
     (lambda: wristctl.load_study(None, "length"), "fix: for example load_study(..., 'wrist.length=0.09')"),

@@ -25,7 +25,7 @@ def test_a_line_says_what_a_run_is_how_it_ended_and_what_it_read(make: Make, res
         first, last = indexed(results)
         timing = data.manifest.timing
         assert first == IndexEntry(
-            data.id, "gen-data", "a", "ok", timing.started, timing.wall_s, "", {"rmse": 0.5}, [], []
+            data.id, "gen-data", "a", "ok", timing.started, timing.wall_s, "", {"rmse": 0.5}, units={"rmse": "rad"}
         )
         assert (last.id, last.kind, last.label, last.state) == (live.id, "train", "b", "failed")
         assert (last.note, last.metrics, last.inputs) == ("the wrist buckles", {}, [data.id])

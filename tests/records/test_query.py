@@ -108,8 +108,36 @@ def test_tags_kinds_labels_and_states_choose_together() -> None:
 
 
 @pytest.mark.parametrize(
+    ("condition", "typed", "chosen"),
+    [
+        ("rmse<0.05", False, "abc"),
+        ("rmse<0.05", True, "ac"),
+        ("rmse<0.05deg", False, "a"),
+        ("rmse < 0.05 deg", True, "a"),
+        ("rmse<1e-3rad", True, "a"),
+        ("rmse>1e-3rad", False, "b"),
+        ("wall_s>=1s", True, "abcd"),
+    ],
+)
+def test_a_number_is_in_its_unit_or_else_in_that_of_files_or_of_what_is_read(
+    condition: str, typed: bool, chosen: str
+) -> None:
+    """Of c, the metric has no unit."""
+    units = {"rmse": "rad"}
+    found = [_entry("a", metrics={"rmse": 5e-4}, units=units), _entry("b", metrics={"rmse": 2e-2}, units=units)]
+    found += [_entry("c", metrics={"rmse": 3e-2}), _entry("d")]
+    assert _labels(select(found, where=[condition], typed=typed)) == list(chosen)
+
+
+@pytest.mark.parametrize(
     ("condition", "said"),
-    [("rmse", "not a condition"), ("rmse<small", "not a condition"), ("rmes<1", "did you mean 'rmse'")],
+    [
+        ("rmse", "not a condition"),
+        ("rmse<small", "not a condition"),
+        ("rmse<1.2.3", "not a condition"),
+        ("rmse<1E-3 m", "no run has rmse in m .*rad or deg"),
+        ("rmes<1", "did you mean 'rmse'"),
+    ],
 )
 def test_a_condition_that_cannot_be_meant_is_an_error(make: Make, results: Path, condition: str, said: str) -> None:
     make()

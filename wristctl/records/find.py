@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wristctl.errors import OUT, Argument, Call, Phrase, UserError, meant, nearest
+from wristctl.reader_units import in_degrees
 from wristctl.records.index import RESULTS, IndexEntry, indexed, run_names
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import NAME_A_RUN, Run
@@ -178,6 +179,7 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
 
 
 _COMPARISONS = {"<=": le, ">=": ge, "!=": ne, "==": eq, "<": lt, ">": gt, "=": eq}
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?inf"
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
 
 
@@ -196,9 +198,14 @@ def select(
     where: Sequence[str] = (),
     newer: str | None = None,
     older: str | None = None,
+    typed: bool = False,
 ) -> list[IndexEntry]:
-    """The entries that meet every condition: `where` like "rmse<1e-3", ages like 30m, 12h, 2d; kind and label may be
-    patterns with *. Raises UserError for a condition that cannot be read, or a metric that no run has."""
+    """The entries that meet every condition: `where` like "rmse<0.5deg", ages like 30m, 12h, 2d; kind and label may be
+    patterns with *.
+
+    A number of `where` without a unit is in that of files (SI), or, if `typed`, in that which people read (deg). Raises
+    UserError for a condition that cannot be read, a metric that no run has, or none in that unit.
+    """
     chosen = [
         entry
         for entry in listed
@@ -208,9 +215,15 @@ def select(
         and (tag is None or tag in entry.tags)
     ]
     for text in where:
-        name, compare, bound = condition(text)
+        name, compare, bound, unit = condition(text)
         _check_metric(name, chosen, text)
-        chosen = [entry for entry in chosen if _is_number(entry.value(name)) and compare(entry.value(name), bound)]
+        values = [_in_unit(entry, name, unit, typed) for entry in chosen]
+        if unit and chosen and all(value is None for value in values):
+            has = dict.fromkeys(each for entry in chosen for each in _units(entry, name))
+            raise UserError(f"no run has {name} in {unit}", Argument("where", text), f"its unit: {' or '.join(has)}")
+        chosen = [
+            entry for entry, value in zip(chosen, values, strict=True) if value is not None and compare(value, bound)
+        ]
     if newer:
         since = _time_ago(newer, "newer")
         chosen = [entry for entry in chosen if entry.started and entry.started >= since]
@@ -238,15 +251,30 @@ def _check_metric(name: str, listed: Sequence[IndexEntry], where: Phrase) -> Non
         raise UserError(f"no run has a metric {name!r}", where, meant(name, sorted(names)))
 
 
-def condition(text: str) -> tuple[str, Any, float]:
-    """The metric, comparison and bound of "rmse<1e-3". Raises UserError for a text that is no condition."""
-    match = re.fullmatch(r"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*([^<>=!]+)", text)
-    try:
-        if match:
-            return match[1], _COMPARISONS[match[2]], float(match[3])
-    except ValueError:
-        pass
-    example = Argument("where", "rmse<1e-3", quoted=True)
+def _units(entry: IndexEntry, name: str) -> tuple[str, str]:
+    """Unit of a metric in files, and the one that people read; empty: none."""
+    unit = entry.units.get(name, "s" if name == "wall_s" else "")
+    return unit, in_degrees(None, unit)[1]
+
+
+def _in_unit(entry: IndexEntry, name: str, unit: str, typed: bool) -> float | None:
+    """A metric in a unit; empty: in that of files, or, if `typed`, in that which people read. None: there is none."""
+    value, (in_files, shown) = entry.value(name), _units(entry, name)
+    if not isinstance(value, int | float) or isinstance(value, bool) or unit not in ("", in_files, shown):
+        return None
+    read: float = in_degrees(float(value), in_files)[0]
+    return read if (unit or (shown if typed else in_files)) == shown else value
+
+
+def condition(text: str) -> tuple[str, Any, float, str]:
+    """The metric, comparison, bound and its unit of "rmse<0.5deg"; the unit may be left out.
+
+    Raises UserError for a text that is no condition.
+    """
+    match = re.fullmatch(rf"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*({_NUMBER})\s*([a-z%][^<>=!]*)?", text.strip(), re.IGNORECASE)
+    if match:
+        return match[1], _COMPARISONS[match[2]], float(match[3]), match[4] or ""
+    example = Argument("where", "rmse<0.5deg", quoted=True)
     raise UserError("not a condition on a metric", Argument("where", text), ("for example ", example))
 
 
@@ -259,7 +287,3 @@ def _time_ago(age: str, option: str) -> str:
     except OverflowError:  # before the calendar begins
         pass
     raise UserError("not an age", Argument(option, age), "a number with s, m, h, d or w: 12h, 2d")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -46,6 +46,8 @@ class IndexEntry:
     """Why a run that ended ok is no good, in a word or two each."""
     figure: str = ""
     """Name of the figure that goes with the answer."""
+    units: dict[str, str] = field(default_factory=dict)
+    """Of the metrics that have one."""
 
     def value(self, name: str) -> Any:
         """A metric, or one of the entry's own fields; None where it has neither."""
@@ -104,7 +106,7 @@ def _remembered(old: list[Any], name: str) -> IndexEntry | None:
         entry = IndexEntry(**old[1])
         texts = [entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note, entry.about, entry.chief]
         texts += [entry.answer, entry.figure]
-        lists = [*entry.inputs, *entry.tags, *entry.metrics, *entry.marks]
+        lists = [*entry.inputs, *entry.tags, *entry.metrics, *entry.units, *entry.units.values(), *entry.marks]
         numbers = [value for value in (entry.wall_s, *entry.metrics.values()) if value is not None]
         fits = all(isinstance(text, str) for text in (*texts, *lists)) and entry.id == name
         return entry if fits and all(isinstance(value, int | float) for value in numbers) else None
@@ -116,7 +118,7 @@ def _entry(run: Run) -> IndexEntry:
     state = run.state
     try:
         manifest = run.manifest
-        metrics = {name: metric.get("value") for name, metric in run.metrics.items()} if state != "broken" else {}
+        found = run.metrics if state != "broken" else {}
         overview = read_overview(run.path)
     except UserError as error:
         place = Path(error.where.partition(": ")[0])
@@ -133,13 +135,14 @@ def _entry(run: Run) -> IndexEntry:
         timing.started,
         timing.wall_s,
         note,
-        metrics,
+        {name: metric.get("value") for name, metric in found.items()},
         inputs,
         about=manifest.about,
         chief=next(iter(overview.cards), ""),
         answer=overview.sentence,
         marks=overview.marks,
         figure=overview.figure or next(iter(overview.captions), ""),
+        units={name: unit for name, metric in found.items() if (unit := metric.get("unit") or "1") != "1"},
     )
 
 

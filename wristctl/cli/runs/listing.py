@@ -13,6 +13,7 @@ from wristctl.cli.options import RESULTS, Json, Out, Ref, run_ids
 from wristctl.cli.output import say
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import Argument, UserError, meant
+from wristctl.reader_units import in_degrees
 from wristctl.records import Run, open_run
 from wristctl.records.difference import Change, difference
 from wristctl.records.find import condition, entries, in_order, select
@@ -32,7 +33,7 @@ def ls(
     state: Annotated[str | None, typer.Option("--state", help="Only runs in this state: ok, failed, ...")] = None,
     tagged: Annotated[str | None, typer.Option("--tag", help="Only runs with this tag.")] = None,
     where: Annotated[
-        list[str] | None, typer.Option("--where", help="Only runs with such a metric: 'rmse<1e-3'; repeatable.")
+        list[str] | None, typer.Option("--where", help="Only runs with such a metric: 'rmse<0.5deg'; repeatable.")
     ] = None,
     newer: Annotated[str | None, typer.Option("--newer", help="Only runs started within: 30m, 12h, 2d.")] = None,
     older: Annotated[str | None, typer.Option("--older", help="Only runs started before: 30m, 12h, 2d.")] = None,
@@ -50,7 +51,7 @@ def ls(
     indexed = entries(out)
     _check_choice("kind", kind, {entry.kind for entry in indexed})
     _check_choice("state", state, get_args(RunState))
-    listed = in_order(select(indexed, kind, label, state, tagged, where, newer, older), sort)
+    listed = in_order(select(indexed, kind, label, state, tagged, where, newer, older, typed=True), sort)
     listed = listed[::-1] if reverse else listed
     if as_json:
         print_json({"schema": "wristctl.runs/1", "runs": list(map(asdict, listed))})
@@ -84,8 +85,12 @@ def _chosen(listed: list[IndexEntry], columns: str) -> Table:
 
 
 def _of_columns(listed: list[IndexEntry], names: list[str]) -> Table:
-    heads = [_LISTED_HEADS.get(name, name) for name in names]
-    return Table("", heads, [[_cell(entry, name) for name in names] for entry in listed])
+    units = {name: {entry.units.get(name, "") for entry in listed if name in entry.metrics} for name in names}
+    heads = []
+    for name in names:
+        (unit,) = units[name] if len(units[name]) == 1 else ("",)
+        heads.append(_LISTED_HEADS.get(name, name) + f" [{unit}]" * bool(unit and not name.endswith(f"_{unit}")))
+    return Table("", heads, [[_cell(entry, name, len(units[name]) > 1) for name in names] for entry in listed])
 
 
 def _check_choice(option: str, value: str | None, allowed: Collection[str]) -> None:
@@ -93,12 +98,20 @@ def _check_choice(option: str, value: str | None, allowed: Collection[str]) -> N
         raise UserError(f"unknown {option.removesuffix('s')} {value!r}", Argument(option, value), meant(value, allowed))
 
 
-def _cell(entry: IndexEntry, name: str) -> Any:
+def _cell(entry: IndexEntry, name: str, with_unit: bool) -> Any:
     if name == "chief":
-        value = entry.metrics.get(entry.chief)
-        return f"{entry.chief} {number(value)}" if isinstance(value, int | float) else ""
+        value = _with_unit(entry, entry.chief)
+        return f"{entry.chief} {value}" if value else ""
+    if with_unit:
+        return _with_unit(entry, name) or None
     value = entry.value(name)
     return ", ".join(value) if isinstance(value, list) else value
+
+
+def _with_unit(entry: IndexEntry, name: str) -> str:
+    """A metric as people read it; empty where there is none."""
+    value, unit = in_degrees(entry.metrics.get(name), entry.units.get(name, ""))
+    return f"{number(value)} {unit}".rstrip() if isinstance(value, int | float) else ""
 
 
 def show(
@@ -187,14 +200,28 @@ def diff(
             say(f"{title}: {names}" + f" and {len(changes) - _FEW} more" * (len(changes) > _FEW))
         say("every difference: --all")
         return
-    tables = [_diff_table(title, changes, changes is differences.metrics) for title, changes in by_subject]
+    tables = [
+        _metrics_table(title, changes, a, b) if changes is differences.metrics else _diff_table(title, changes)
+        for title, changes in by_subject
+    ]
     print("\n\n".join(table.text() for table in tables) or "nothing differs")
 
 
-def _diff_table(title: str, changes: Sequence[Change], of_metrics: bool) -> Table:
-    if of_metrics:
-        rows = [(name, before, after, *_change(before, after)) for name, before, after in changes]
-        return Table(title, ("metric", "before", "after", "change", "change [%]"), rows)
+def _metrics_table(title: str, changes: Sequence[Change], a: Run, b: Run) -> Table:
+    """Changes of metrics as people read them; without their difference where the units differ."""
+    rows: list[tuple[Any, ...]] = []
+    runs = (a.metrics, b.metrics)
+    for name, *values in changes:
+        units = [run[name].get("unit") or "" if name in run else "" for run in runs]
+        (before, unit), (after, other) = map(in_degrees, values, units)
+        if unit and other and unit != other:
+            rows.append((name, before, after, None, None, f"{unit}, {other}"))
+        else:
+            rows.append((name, before, after, *_change(before, after), unit or other))
+    return Table(title, ("metric", "before", "after", "change", "change [%]", "unit"), rows)
+
+
+def _diff_table(title: str, changes: Sequence[Change]) -> Table:
     return Table(title, ("what", "before", "after"), [(name, _text(a), _text(b)) for name, a, b in changes])
 
 
