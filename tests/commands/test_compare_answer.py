@@ -111,6 +111,20 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
     assert "Do not use: in motors + camera mrac and pid/printed." in said
 
 
+def test_the_page_and_the_listing_are_headed_by_the_condition_that_the_answer_speaks_of_first() -> None:
+    usual, pushed = {"pid-ff/default": 1e-3, "mrac/default": 2e-3}, {"pid-ff/default": 3e-3, "mrac/default": 2e-3}
+    rig, steps = stands("camera and tendons", usual), stands("camera and tendons, steps", usual)
+    findings = Findings(0)
+    head_with_the_best(findings, [stands("exact", usual), rig, steps])
+    assert findings.overview.cards == ["best_camera_and_tendons", "best_exact", "best_camera_and_tendons_steps"]
+    assert next(iter(findings.metrics)) == "best_exact"
+    others = [stands("exact", pushed), stands("sampled", usual), stands("off-nominal", usual)]
+    head_with_the_best(findings, others)
+    assert findings.overview.cards == ["best_sampled", "best_off-nominal", "best_exact"], "where what it uses is best"
+    head_with_the_best(findings, [stands("exact", usual), stands("camera and tendons", swings=tuple(RMSE))])
+    assert findings.overview.cards == ["best_exact"], "of a condition without a usable one there is none"
+
+
 def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
     one = stands(
         swings=("smc/exchanged",), away=("smc/printed",), strained=("gvsc/default",), chatters=("pid/printed",),

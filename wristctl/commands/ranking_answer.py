@@ -172,6 +172,15 @@ def _sides(rankings: Sequence[Ranking]) -> list[list[Ranking]]:
     return [alike for alike in sides if alike]
 
 
+def led(rankings: Sequence[Ranking]) -> list[Ranking]:
+    """Rankings in the order in which `advice` speaks of them: those where what it says to use is best come first."""
+    told = list[Ranking]()
+    for alike in _sides(rankings):
+        chosen = _chosen(alike)
+        told += sorted(alike, key=lambda ranking: chosen not in first_group(ranking))
+    return [*told, *(ranking for ranking in rankings if ranking not in told)]
+
+
 def _chosen(alike: Sequence[Ranking]) -> str | None:
     """The controller that is among the best in most of these rankings; of those, that with the least error there."""
     often = Counter(label for ranking in alike for label in first_group(ranking))

@@ -18,6 +18,7 @@ from wristctl.commands.ranking_answer import (
     error,
     gains_words,
     is_by_loop,
+    led,
     names_of,
     not_to_use,
     open_loop,
@@ -201,15 +202,15 @@ def papers_order(rankings: Sequence[Ranking]) -> str:
 
 
 def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
-    """Let the run's page be headed by the error of the best row under each condition."""
-    headed: list[str] = []
+    """Let the run's page be headed by the error of the best row under each condition, that of the answer first."""
+    headed: dict[str, str] = {}
     for ranking in rankings:
         if (best := winner(ranking, rankings)) is not None:
             name = f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
             meaning = f"RMSE of {ranking.labels[best]}, the best there, over {ranking.cases}"
             keep_error(findings, name, ranking, best, meaning)
-            headed.append(name)
-    findings.headline(*headed)
+            headed[ranking.name] = name
+    findings.headline(*(headed[ranking.name] for ranking in led(rankings) if ranking.name in headed))
 
 
 # Metrics that a motion which never rests does not have.
