@@ -14,7 +14,7 @@ from pandas.testing import assert_frame_equal
 
 import wristctl
 from wristctl.commands.simulate.results import Simulated
-from wristctl.commands.sweep.answer import headline, quantities, sentence
+from wristctl.commands.sweep.answer import answer, headline, quantities, sentence
 from wristctl.commands.sweep.figures import over_setting
 from wristctl.config.study import Study
 from wristctl.errors import UserError
@@ -249,8 +249,51 @@ def test_a_search_and_a_comparison_are_done_at_every_point() -> None:
     tuned = wristctl.tune(swept(base, "tune.iterations=1,4")).frame()
     assert tuned["pd-ff_objective"][1] <= tuned["pd-ff_objective"][0] and "pd-ff_Kp" in tuned
     compared = wristctl.compare(swept(base, "wrist.damping=0.05,0.2")).frame()
-    (name,) = [each for each in map(str, compared) if each.startswith("rmse_fast_pd-ff")]
+    (name,) = [each for each in map(str, compared) if each.startswith("rmse_fast_")]
     assert compared[name].nunique() == 2
+
+
+@pytest.mark.slow
+def test_a_swept_comparison_has_a_row_for_each_controller_and_a_column_for_each_condition() -> None:
+    base = wristctl.load_study(
+        None, "compare.controllers=[{controller: pd-ff}, {controller: pid-ff}]", "compare.horizon=0.4",
+        "compare.loops={exact: {plant_segments: 1}, rig: {actuator: {level: tendon}, plant_segments: 1}}",
+        "compare.references=[{duration: 0.2}]", "compare.inverses=[none]",
+    )  # fmt: skip
+    done: Any = wristctl.compare(swept(base, "wrist.stiffness=0.6,1.2"))
+    (shown,), table = done.tables, done.frame()
+    heads = [head for head in shown.columns if head.startswith("RMSE")]
+    assert heads == ["RMSE, motors [deg]", "RMSE, ideal [deg]"], "what the answer of one leads with is first"
+    at_row = [shown.columns.index(head) for head in ("wrist.stiffness [N m/rad]", "controller")]
+    rows = [tuple(row[at] for at in at_row) for row in shown.rows]
+    assert rows == [(value, name) for value in (0.6, 1.2) for name in ("pd-ff/default", "pid-ff/default")]
+    for value in (0.6, 1.2):
+        alone: Any = wristctl.compare(
+            base.model_copy(update={"wrist": base.wrist.model_copy(update={"stiffness": value})})
+        )
+        found = table[table["wrist.stiffness"] == value].set_index("controller")
+        for ranking in alone.rankings:
+            for label in ranking.labels:
+                name = f"rmse_{ranking.name.replace(' ', '_')}"
+                assert found.loc[label, name] == pytest.approx(ranking.of_label(label).value, rel=1e-12)
+        for row in alone.rows:
+            (name,) = [each for each in table if str(each).startswith(f"rmse_{row.loop}_none_")]
+            assert found.loc[row.label, name] == pytest.approx(row.repeated.metrics["rmse"][0], rel=1e-12)
+
+
+def test_on_the_screen_a_swept_comparison_has_whole_points() -> None:
+    names = [f"c{number}" for number in range(5)]
+    frame = pd.DataFrame([(0.1 * k, k, 0, name, 1e-2 * (k + 1)) for k in range(30) for name in names])
+    frame.columns = pd.Index(["x", "point", "repetition", "controller", "rmse_a"])
+    about = {"rmse_a": {"unit": "rad", "heading": "RMSE, a"}}
+    columns = quantities(frame, {"x": ""}, about)
+    keys = [columns["x"], columns["controller"]]
+    found = answer("compare", frame, keys, [columns["rmse_a"]])
+    assert found.table is not None and [row[1] for row in found.table.rows] == names * 2
+    assert [row[0] for row in found.table.rows[::5]] == [0.0, pytest.approx(2.9)]
+    assert "lowest RMSE, a 0.573 deg at x = 0, controller = c0" in found.sentence
+    frame["fate"] = ["swings in a"] + [""] * 149
+    assert "; 1 of 150 rows: swings in a." in answer("compare", frame, keys, [columns["rmse_a"]]).sentence
 
 
 def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_path: Path) -> None:

@@ -247,6 +247,15 @@ class StudyResult(ABC):
         """The answer in lines of at most 100 columns; empty where the tables are the answer."""
         return self.answer.lines() if self.answer is not None else ()
 
+    def at_a_point(self) -> tuple[Mapping[str, Sequence[Any]], Mapping[str, Mapping[str, Any]]]:
+        """What a sweep keeps of it at one point: columns of values by name, and what is known of each of these.
+
+        Here a row of metrics with their units, in the units of metrics.json.
+        """
+        metrics = self.findings.metrics
+        values = {name: [value] for name, value in self.metrics.items()}
+        return values, {name: {"unit": metric["unit"]} for name, metric in metrics.items()}
+
     @property
     def marks(self) -> list[str]:
         """Why a result is no good, in a word or two each: the verdict on the run's page; empty where it is sound."""

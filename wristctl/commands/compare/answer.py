@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -206,11 +207,42 @@ def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
     headed: dict[str, str] = {}
     for ranking in rankings:
         if (best := winner(ranking, rankings)) is not None:
-            name = f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
+            name = f"best_{_slug(ranking)}"
             meaning = f"RMSE of {ranking.labels[best]}, the best there, over {ranking.cases}"
             keep_error(findings, name, ranking, best, meaning)
             headed[ranking.name] = name
     findings.headline(*(headed[ranking.name] for ranking in led(rankings) if ranking.name in headed))
+
+
+def by_controller(
+    rankings: Sequence[Ranking], rows: Sequence[ComparedRow]
+) -> tuple[dict[str, list[Any]], dict[str, dict[str, Any]]]:
+    """Columns with a value for each controller, RMSE [rad] under each condition first, and what is known of columns."""
+    labels, about = labels_of(rankings), dict[str, dict[str, Any]]()
+    fates: dict[str, list[str]] = {label: [] for label in labels}
+    errors: dict[str, dict[str, float]] = {}
+    for ranking in led(rankings):
+        name = f"rmse_{_slug(ranking)}"
+        lost = set(ranking.standing.unusable) & set(np.nonzero(~np.isfinite(ranking.scores).all(axis=1))[0].tolist())
+        errors[name] = {
+            label: np.nan if row in lost else ranking.means[row].value for row, label in enumerate(ranking.labels)
+        }
+        about[name] = {"unit": "rad", "heading": f"RMSE, {condition(ranking)}", "chief": True}
+        for row in ranking.standing.unusable:
+            if (fault := ranking.fault(row)) is not None:
+                place = f" in {condition(ranking)}" * (len(rankings) > 1)
+                fates[ranking.labels[row]].append(f"{fault.kind}{place}")
+    for result in rows:
+        name = f"rmse_{result.loop}_{result.inverse}_{result.reference}".replace(" ", "-")
+        errors.setdefault(name, {})[result.label] = spread(result.repeated.metrics["rmse"]).median
+        about[name] = {"unit": "rad"}
+    columns: dict[str, list[Any]] = {"controller": labels}
+    columns |= {"fate": [", ".join(fates[label]) for label in labels]} if any(fates.values()) else {}
+    return columns | {name: [of_rows.get(label, np.nan) for label in labels] for name, of_rows in errors.items()}, about
+
+
+def _slug(ranking: Ranking) -> str:
+    return ranking.name.replace(",", "").replace(" ", "_")
 
 
 # Metrics that a motion which never rests does not have.

@@ -116,6 +116,15 @@ class Compared(StudyResult):
             return pd.concat([ranking_frame(ranking) for ranking in worlds], ignore_index=True)
         return frame(self.rows, paper_cells(self.study))
 
+    def at_a_point(self) -> tuple[Mapping[str, Sequence[Any]], Mapping[str, Mapping[str, Any]]]:
+        """A row for each controller: RMSE [rad] under each condition, then on each loop in each motion.
+
+        It is nan where the wrist left its range, and what is wrong with it is the row's `fate`.
+        """
+        from wristctl.commands.compare.answer import by_controller
+
+        return by_controller(self.rankings, self.rows)
+
     def series(self) -> dict[str, np.ndarray]:
         """Courses over time, one row per combination, every fifth sample; SI units."""
         from wristctl.commands.compare.csv_data import series

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table
@@ -24,20 +25,29 @@ _FIRST = ("rmse", "steady_state", "oscillation", "chattering")
 # Mark of a rollout that left its range.
 FAILED = "failed"
 FATE = Quantity("fate", meaning="why a rollout is no good; empty where it is sound")
+CONTROLLER = Quantity("controller", meaning="controller with its gains")
 _ROLLOUT = (
     Quantity("point", meaning="number of the point"), Quantity("repetition", meaning="number of the repetition"),
     Quantity("failed", meaning="whether the wrist left its range"), Quantity("until", "s", "when it did, or the end"),
-    FATE,
+    CONTROLLER, FATE,
 )  # fmt: skip
 
 
-def quantities(table: pd.DataFrame, settings: Mapping[str, str], units: Mapping[str, str]) -> dict[str, Quantity]:
-    """Quantities of a sweep's columns, by name; of metrics that are not those of a loop in these `units`.
+def quantities(
+    table: pd.DataFrame, settings: Mapping[str, str], about: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Quantity]:
+    """Quantities of a sweep's columns, by name; of metrics that are not those of a loop by `about`: unit, heading.
 
-    `table` has a row for each point and repetition, `settings` the unit of each that was swept.
+    `table` has a row for each point and repetition or controller, `settings` the unit of each that was swept.
     """
-    about = {quantity.name: quantity for quantity in (*(_setting(*one) for one in settings.items()), *_ROLLOUT)}
-    return {name: about.get(name) or of_metric(name, units.get(name, "")) for name in map(str, table)}
+    told = {quantity.name: quantity for quantity in (*(_setting(*one) for one in settings.items()), *_ROLLOUT)}
+
+    def quantity(name: str) -> Quantity:
+        facts = about.get(name, {})
+        metric = of_metric(name, facts.get("unit", ""))
+        return told.get(name) or replace(metric, heading=facts.get("heading", metric.heading))
+
+    return {name: quantity(name) for name in map(str, table)}
 
 
 def _setting(key: str, unit: str) -> Quantity:
@@ -58,7 +68,8 @@ def headline(table: pd.DataFrame, metrics: Sequence[Quantity]) -> list[Quantity]
     def tells(metric: Quantity) -> bool:
         return metric.name == "rmse" or not unmeasurable(table[metric.name].dropna(), metric).all()
 
-    measured = {metric.name: metric for metric in metrics if table[metric.name].notna().any() and tells(metric)}
+    known = [metric for metric in metrics if table[metric.name].notna().any()]
+    measured = {metric.name: metric for metric in list(filter(tells, known)) or known}
     return list(({name: measured[name] for name in _FIRST if name in measured} | measured).values())[:_METRICS]
 
 
@@ -71,7 +82,7 @@ def answer(
     The first metric is the main one; `run` is the path, empty for a result in memory. `presets` are the controllers
     with the gains that they have by their loops, where nobody chose any.
     """
-    chosen = _some(table, [key.name for key in keys])
+    chosen = _some(table, [key.name for key in keys if key.name != CONTROLLER.name])
     where = f"{run}/data/sweep.csv" if run else "`.frame()`"
     more = f"{len(chosen)} of {len(table)} rows; all of them: {where}." if len(chosen) < len(table) else ""
     shown = rows_of(chosen, keys, metrics).within(COLUMNS)
@@ -93,7 +104,7 @@ def sentence(command: str, table: pd.DataFrame, keys: Sequence[Quantity], metric
         if not unmeasurable(table[metric.name], metric).all():
             text += f"; highest {' at '.join(_extreme(table, keys, metric, 'idxmax'))}"
     for fate, count in fates(table).items():
-        text += f"; {count} of {len(table)} rollouts: {fate}"
+        text += f"; {count} of {len(table)} {_counted(table)}: {fate}"
     return f"{text}."
 
 
@@ -101,10 +112,14 @@ def least(table: pd.DataFrame, keys: Sequence[Quantity], metric: Quantity) -> st
     """Where a metric is least, in words; at how many points nobody could measure it, where these are several."""
     tiny, count = int(unmeasurable(table[metric.name], metric).sum()), len(table)
     if tiny > 1:
-        where = f"{tiny} of {count} rollouts, such as {_extreme(table, keys, metric, 'idxmin')[1]}"
+        where = f"{tiny} of {count} {_counted(table)}, such as {_extreme(table, keys, metric, 'idxmin')[1]}"
         bound = metric.said(float(measurable(0.0, metric)))
         return f"{metric.words} is below {bound} at {'every point' if tiny == count else where}"
     return f"lowest {metric.words} {' at '.join(_extreme(table, keys, metric, 'idxmin'))}"
+
+
+def _counted(table: pd.DataFrame) -> str:
+    return "rows" if "controller" in table else "rollouts"
 
 
 def _extreme(table: pd.DataFrame, keys: Sequence[Quantity], metric: Quantity, which: str) -> tuple[str, str]:
@@ -139,15 +154,22 @@ def fates(table: pd.DataFrame) -> dict[str, int]:
     from wristctl.simulation.repetitions import MARKS
 
     counts = Counter(mark for fate in table["fate"] for mark in fate.split(", ") if mark)
-    return {mark: counts[mark] for mark in MARKS if counts[mark]}
+    return {mark: counts[mark] for mark in dict.fromkeys((*MARKS, *counts)) if counts[mark]}
 
 
 def _some(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
-    """At most so many rows as the first screen has; of a swept number in order, from its least to its largest."""
+    """At most so many rows as the first screen has; of a swept number in order, from its least to its largest.
+
+    Of a point it has the rows of all controllers, and two points at least.
+    """
     import numpy as np
 
+    points = table.drop_duplicates("point") if "controller" in table else table
+    most = max(2, round(_ROWS * len(points) / len(table)))
     numbers = [key for key in keys if table[key].dtype.kind in "if"]
-    ordered = table.sort_values([*numbers, *(key for key in keys if key not in numbers)], kind="stable")
-    if len(ordered) <= _ROWS:
-        return ordered if len(keys) == 1 else table
-    return ordered.iloc[np.unique(np.linspace(0, len(ordered) - 1, _ROWS).round().astype(int))]
+    ordered = points.sort_values([*numbers, *(key for key in keys if key not in numbers)], kind="stable")
+    if len(ordered) > most:
+        points = ordered.iloc[np.unique(np.linspace(0, len(ordered) - 1, most).round().astype(int))]
+    elif len(keys) == 1:
+        points = ordered
+    return points[["point"]].merge(table, on="point") if "controller" in table else points

@@ -27,7 +27,7 @@ from wristctl.commands.progress import watched
 from wristctl.commands.quantities import Quantity, documented
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session, Unattended
-from wristctl.commands.sweep.answer import answer, fates, headline, metrics_of, quantities, rows_of
+from wristctl.commands.sweep.answer import CONTROLLER, answer, fates, headline, metrics_of, quantities, rows_of
 from wristctl.commands.units import performed
 from wristctl.config.controller_row import BY_LOOP
 from wristctl.config.loop import LOOPS
@@ -133,7 +133,7 @@ def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """All metrics of a command that is performed in memory at one point, with their units."""
+    """What a command found that is performed in memory at one point, and what is known of its columns, as JSON."""
     import numpy as np
 
     from wristctl.commands.perform import Prepared, perform
@@ -141,10 +141,11 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     (study,) = _studies(spec)
     procedure = procedure_named(spec["command"])
     result = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
-    metrics = result.findings.metrics
-    values = {f"metric {name}": np.array([value]) for name, value in result.metrics.items()}
-    units = {f"unit {name}": np.array([metric["unit"]]) for name, metric in metrics.items()}
-    return {"point": np.zeros(1, np.int64), "repetition": np.zeros(1, np.int64), **values, **units}
+    columns, about = result.at_a_point()
+    values = {f"metric {name}": np.array(column) for name, column in columns.items()}
+    told = {f"about {name}": np.array([json.dumps(facts)]) for name, facts in about.items()}
+    none = np.zeros(max(map(len, columns.values()), default=1), np.int64)
+    return {"point": none, "repetition": none, **values, **told}
 
 
 Found = TypeVar("Found", bound=StudyResult)
@@ -301,13 +302,11 @@ def _swept(session: Session, command: str) -> Swept:
                 loop_warnings.warn_if_coarse([at_corner.loop])
                 loop_warnings.warn_outside_conditions([at_corner], [at_corner.loop])
         outcome = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
-    parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
+    parts, about, first = list[pd.DataFrame](), dict[str, dict[str, Any]](), 0
     for unit, arrays in zip(units, outcome.arrays, strict=True):
         if arrays is not None:
-            known_units |= {name[5:]: str(array[0]) for name, array in arrays.items() if name.startswith("unit ")}
-            rows = {
-                name.removeprefix("metric "): array for name, array in arrays.items() if not name.startswith("unit ")
-            }
+            about |= {name[6:]: json.loads(str(array[0])) for name, array in arrays.items() if name[:6] == "about "}
+            rows = {name.removeprefix("metric "): array for name, array in arrays.items() if name[:6] != "about "}
             parts.append(pd.DataFrame(rows | {"point": rows["point"] + first}))
         first += unit.size
     if not parts:
@@ -320,10 +319,11 @@ def _swept(session: Session, command: str) -> Swept:
     table = pd.concat(parts, ignore_index=True)
     for number, axis in enumerate(axes):
         table.insert(number, axis.key, [points[index][number] for index in table["point"]])
-    columns = quantities(table, {axis.key: unit_at(base, axis.path) for axis in axes}, known_units)
+    columns = quantities(table, {axis.key: unit_at(base, axis.path) for axis in axes}, about)
     findings.table("data/sweep.csv", table, *documented(columns.values()))
-    keys = [columns[axis.key] for axis in axes]
-    shown = headline(table, metrics_of(columns, keys))
+    keys = [columns[name] for name in (*(axis.key for axis in axes), CONTROLLER.name) if name in columns]
+    chief = [columns[name] for name, facts in about.items() if facts.get("chief")]
+    shown = headline(table, chief or metrics_of(columns, keys))
     _note(findings, table, shown)
     with session.drawing():
         for key in keys:
