@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from tests.trial.conftest import WRIST, settings_of
+from tests.trial.in_two_planes import PLANES, circling
 from tests.values import LAST_MOVES, multi_step
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
@@ -195,6 +196,21 @@ def test_a_perfect_follower_of_five_degrees_back_passes_nothing() -> None:
     log = course(theta=followed.theta_ref)
     values = evaluated(Trial(0, "radial", 0, 0.0, 0), log, followed, pushed_by(PUSH), None)
     assert values["overshoot"] == 0.0 and values["settling"] == pytest.approx(1.0, abs=2 * PERIOD)
+
+
+@pytest.mark.parametrize("of", ["", "true_"])
+@pytest.mark.parametrize("kind", ["minimum-jerk", "circumduction", "diagonal"])
+def test_in_two_planes_a_move_settles_when_it_does_in_one_and_a_path_without_an_end_never(kind: str, of: str) -> None:
+    """The wrist is a perfect follower, which in one plane settles shortly before its reference rests."""
+    reference = {"kind": kind, "angle_deg": 20.0, "duration": 1.0}
+    settings = circling(planes=2, reference=reference, directions=("ulnar-flexion",), horizon=2.0)
+    followed = motion_of(settings, WRIST, "ulnar-flexion")
+    bends = {f"bend_{plane}": column for plane, column in zip(PLANES, followed.bend_ref.T, strict=True)}
+    rest = {f"{name}_{plane}": 0.0 for name in ("error", "load", "torque", "torque_wanted") for plane in PLANES}
+    log = pd.DataFrame({"time": followed.time, **bends}).assign(**rest, **dict.fromkeys(NAMES, 5.0))
+    values = evaluated(Trial(0, "ulnar-flexion", 0, 0.0, 0), log, followed, settings, log)
+    settled = values[f"{of}settling"]
+    assert math.isnan(settled) if kind == "circumduction" else 0.8 < settled < 1.0
 
 
 @pytest.mark.parametrize("direction", ["ulnar", "radial", "flexion", "extension"])

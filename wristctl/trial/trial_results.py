@@ -45,12 +45,10 @@ if TYPE_CHECKING:
 # The metrics of the paper's tables; also told of the true angle, where it is known.
 JUDGED = ("rmse", "settling", "steady_state", "oscillation")
 # Of a motion in two planes: metrics that the log alone gives, and those that the true bend gives too.
-TRULY = ("rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "oscillation")
+TRULY = ("rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "settling", "oscillation")
 LOGGED = (*TRULY, "peak_tension", "chattering", "saturation")
 # Columns of trials.csv beside the metrics of a motion in two planes: unit and meaning.
 FURTHER: Mapping[str, tuple[str, str]] = {
-    "settling": ("s", "time from which |e| stays within 2 % of the largest bend; empty where it never does"),
-    "true_settling": ("s", "the same of the emulated wrist's true bend"),
     "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the largest bend"),
     "true_recovery": ("s", "the same by the emulated wrist's true bend, from the true end of the push"),
     "push_torque": ("N m", "largest load torque of the push, as estimated; empty where the wrist moves meanwhile"),
@@ -196,7 +194,7 @@ def evaluated(
     """
     names, one = names_of_planes(followed.planes, trial.plane), followed.planes == 1
     by_log, truly = ((*summed(), "oscillation"), JUDGED) if one else (LOGGED, TRULY)
-    spatial = () if one else ("settling", *ELLIPSE)
+    spatial = () if one else ELLIPSE
     columns = [*by_log, *(f"true_{name}" for name in truly), *_OF_PUSH, *spatial, *(f"true_{name}" for name in spatial)]
     metrics = dict.fromkeys(columns, math.nan)
     grid, push, period = followed.time, settings.push, settings.control_period
@@ -221,10 +219,8 @@ def evaluated(
         values = metrics_of(period, bend, followed.bend_ref, tension, followed.goals, saturated)
         swings = oscillations(bend.T, followed.bend_ref.T, np.arange(len(names)), period)
         values["oscillation"] = float(np.max(swings))
-        if not one:  # a path comes to rest nowhere
-            error = bend - followed.bend_ref
-            values["settling"] = recovery(grid, size_of(error), reach, 0.0)
-            values |= zip(ELLIPSE, error_ellipse(error), strict=True)
+        if not one:
+            values |= zip(ELLIPSE, error_ellipse(bend - followed.bend_ref), strict=True)
         return values
 
     def of(values: dict[str, float], chosen: Sequence[str]) -> dict[str, float]:
@@ -324,5 +320,5 @@ def _as_seen(simulated: Simulation, followed: Motion, period: float) -> Simulati
     course = replace(simulated.trajectory, theta=simulated.trajectory.seen)
     values = metrics_of(period, course.theta, course.theta_ref, course.tension, followed.goals)
     values["oscillation"] = oscillation(course)
-    told = {name: values[name] for name in (*TRULY, "settling") if name in values}
+    told = {name: values[name] for name in TRULY if name in values}
     return replace(simulated, trajectory=course, metrics=simulated.metrics | told)

@@ -67,8 +67,7 @@ def _sentence(trials: pd.DataFrame, label: str, moving: set[int]) -> str:
             said.append(f"{degrees(float(each.min()))} to {degrees(float(each.max()))} deg by direction")
         parts.append(error + f" ({'; '.join(said)})" * bool(said))
         if moving.isdisjoint(free["trial"]):
-            on_path = told["settling"] == 0.0
-            parts.append("stays within 2 % of its bend" if on_path else _within("settles", told["settling"]))
+            parts.append(_within("settles", told["settling"]))
     if len(pushed):
         told = means(pushed)
         force = ", ".join(f"{newtons:g}" for newtons in sorted(set(pushed["force"])))
