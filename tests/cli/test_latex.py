@@ -93,6 +93,18 @@ def test_the_table_of_an_answer_has_its_sentence_for_a_caption(call: Call, tmp_p
     assert captions == [rf"Simulate at 2 points: lowest RMSE 1 deg at 100 \% of it. Run {name}.", "T"]
 
 
+@pytest.mark.parametrize(
+    "begins", ["ct-dob/w=35 in two planes:", "smc: error 1 deg", "lib/my.py:MINE/default:", "pid-ff with its gains"]
+)
+def test_a_caption_leaves_a_controllers_name_as_it_is(begins: str, call: Call, tmp_path: Path) -> None:
+    with start_run("hw-run", Study(), "", tmp_path / "results") as live:
+        findings = Findings(0, live)
+        findings.overview.answer[:] = [begins]
+        findings.keep_overview()
+        live.file(TABLES_OF_RUNS).write_text(json.dumps([{"title": "", "columns": ["x"], "rows": [[1.0]]}]))
+    assert rf"\caption{{{begins} Run" in call("runs", "table", "latest:hw-run", "--latex")[1]
+
+
 def test_bibtex_names_the_run_by_its_result_and_wristctl_as_the_readme_does(call: Call, tmp_path: Path) -> None:
     many_runs(tmp_path / "results", 2)
     code, out, _ = call("runs", "cite", run_name(1))

@@ -193,6 +193,29 @@ def test_a_name_alone_is_told_with_its_preset_under_each_condition() -> None:
     assert not presets_of_names([stands()], {"pid-ff/default": {"Kp": 1.0}}), "none was typed by its name alone"
 
 
+def test_that_no_gains_are_tuned_is_said_of_the_rows_that_it_is_true_of() -> None:
+    alone = {"smc": 1e-3, "pid-ff": 2e-3, "feedforward": 0.1}
+    gains = {"smc/default": {"P1": 1.0}, "pid-ff/default": {"Kp": 1.0}, "ct-dob/tuned": {"w": 30.0}}
+    said = presets_of_names([stands(rmse=alone)], gains)
+    assert "none is tuned" in said and "smc" not in said
+    said = presets_of_names([stands(rmse=alone | {"ct-dob/tuned": 1e-3})], gains)
+    assert "(smc and pid-ff)" in said and "none" not in said and "ct-dob" not in said
+
+
+def test_gains_by_value_have_a_short_name_where_the_controller_has_one_row_of_them() -> None:
+    first, other, third = "pid-ff/Kp=7.2346 Kd=0.144692 Ki=86.8152", "pid-ff/Kp=1", "ct-dob/w=35 zeta=0.6 wo=300"
+    gains = {first: {"Kp": 7.2346, "Kd": 0.144692, "Ki": 86.8152}, third: {"w": 35.0}}
+    answer = answer_of([stands(rmse={first: 1e-3, third: 2e-3, "smc/default": 3e-3})], gains=gains, asked=[first])
+    assert answer is not None and answer.table is not None
+    assert [row[0] for row in answer.table.rows] == ["pid-ff/given", "ct-dob/given", "smc/default"]
+    assert "use pid-ff/given: RMSE" in answer.sentence
+    said = " ".join(" ".join(answer.lines()).split())
+    assert "pid-ff/given has Kp = 7.235 N m/rad" in said and "given by value" in said
+    several = answer_of([stands(rmse={first: 1e-3, other: 2e-3, third: 3e-3})])
+    assert several is not None and "use pid-ff/Kp=7.2346" in several.sentence and several.table is not None
+    assert [row[0] for row in several.table.rows][1:] == ["pid-ff/Kp=1", "ct-dob/given"]
+
+
 def test_beyond_a_dozen_the_table_has_the_best_the_asked_for_and_the_number_of_the_rest() -> None:
     many = {f"c{number:02d}/default": 1e-3 * (1.0 + number) for number in range(30)}
     one, other = stands(rmse=many), stands("pushed", rmse=many | {"c29/default": 1e-5})

@@ -14,6 +14,7 @@ from wristctl.cli.command import trusting
 from wristctl.cli.options import RESULTS, Out, Quiet, Ref, TrustCode
 from wristctl.cli.output import say
 from wristctl.cli.progress import Bar, Terminal, listening, progress
+from wristctl.config.choices import CONTROLLERS
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.records import Run, open_run
 from wristctl.records.index import DRAWN
@@ -140,7 +141,9 @@ def table(
             raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
     positions = number or range(1, len(run_tables) + 1)
     sentence = " ".join(takewhile(bool, read_overview(run.path).answer))  # the answer's own table has no title
-    caption = f"{capital(sentence)} Run {run.id}." if sentence else f"{run.kind}: run {run.id}"
+    names_one = re.match(r"\S+\.py:", sentence) or re.split(r"[ /:,]", sentence)[0] in CONTROLLERS
+    begins = sentence if names_one else capital(sentence)
+    caption = f"{begins} Run {run.id}." if sentence else f"{run.kind}: run {run.id}"
     chosen = {f"{run.kind}-{position}": run_tables[position - 1] for position in positions}
     texts = [latex_table(one, label, caption) if latex else one.text() for label, one in chosen.items()]
     print("\n\n".join(texts))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,11 @@ def answer_of(
     """
     if not rankings:
         return None
+    short = given_names(labels_of(rankings))
+    if any(short[label] != label for label in short):
+        rankings = [replace(one, labels=[short[label] for label in one.labels]) for one in rankings]
+        gains = {short.get(label, label): values for label, values in (gains or {}).items()}
+        asked = [short.get(label, label) for label in asked]
     names = names_of(rankings)
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     notes = [
@@ -70,6 +77,14 @@ def answer_of(
         "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist)." * (not own_wrist),
     ]
     return Answer(advice(rankings), controllers_table(rankings, names, asked), more=more).fitted(notes)
+
+
+def given_names(labels: Sequence[str]) -> dict[str, str]:
+    """Names by label: controller/given of the one row of a controller whose gains are given by value."""
+    given = [label for label in labels if "=" in label.partition("/")[2]]
+    often = Counter(label.partition("/")[0] for label in given)
+    own = {label: f"{label.partition('/')[0]}/given" for label in given if often[label.partition("/")[0]] == 1}
+    return {label: own.get(label, label) for label in labels}
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
@@ -93,7 +108,10 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
 
 
 def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
-    """Which preset a controller has under which condition that was typed by its name alone; empty where none was."""
+    """Which preset a controller has under which condition that was typed by its name alone; empty where none was.
+
+    They are named where other rows have gains of their own.
+    """
     rig = {condition(one): one.traits.rig for one in rankings}
     usual = [preset for preset, wanted in (("hardware", True), ("default", False)) if wanted in rig.values()]
     alone = list(filter(is_by_loop, labels_of(rankings)))
@@ -107,7 +125,11 @@ def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[st
     if len(usual) > 1:
         words = f"preset hardware in {joined([name for name, is_rig in rig.items() if is_rig])}, default elsewhere"
     odd = f" ({'; '.join(others)})" if others else ""
-    return f"A name alone has its {words}{odd}: none is tuned for this."
+    if all(is_by_loop(label) or open_loop(label) for label in labels_of(rankings)):
+        return f"A name alone has its {words}{odd}: none is tuned for this."
+    return (
+        f"A name alone ({joined([label for label in alone if own[label]])}) has its {words}{odd}: not tuned for this."
+    )
 
 
 def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
@@ -140,6 +162,7 @@ _GAINS = {
     "default": "for exact angles and torques",
     "hardware": "for motors and a camera",
     "tuned": "by search",
+    "given": "by value in the study",
 }
 
 
@@ -236,9 +259,10 @@ def by_controller(
         name = f"rmse_{result.loop}_{result.inverse}_{result.reference}".replace(" ", "-")
         errors.setdefault(name, {})[result.label] = spread(result.repeated.metrics["rmse"]).median
         about[name] = {"unit": "rad"}
-    columns: dict[str, list[Any]] = {"controller": labels}
+    columns: dict[str, list[Any]] = {"controller": list(given_names(labels).values())}
     columns |= {"fate": [", ".join(fates[label]) for label in labels]} if any(fates.values()) else {}
-    return columns | {name: [of_rows.get(label, np.nan) for label in labels] for name, of_rows in errors.items()}, about
+    columns |= {name: [of_rows.get(label, np.nan) for label in labels] for name, of_rows in errors.items()}
+    return columns, about
 
 
 def _slug(ranking: Ranking) -> str:
