@@ -232,6 +232,17 @@ def test_what_is_left_out_is_one_warning_and_no_row(caplog: pytest.LogCaptureFix
     done = wristctl.compare(wristctl.load_study(None, f"compare={{{small}, {rows}}}"))
     assert [each.label for each in done.rows] == ["feedforward/default"]
     assert [text.count("pid/tuned") for text in caplog.messages if "left out" in text] == [1]
+    assert not any("network" in text for text in caplog.messages), "which nobody asked for"
+
+
+@pytest.mark.parametrize("asked", ["", "inverses: [network, closed-form], "])
+def test_a_network_that_is_missing_is_told_of_where_it_was_asked_for(
+    asked: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    rows = "horizon: 0.3, loops: {fast: {plant_segments: 1}}, references: [{duration: 0.2}], rows: [{controller: pid}]"
+    done = wristctl.compare(wristctl.load_study(None, f"compare={{{asked}{rows}}}"))
+    assert {row.inverse for row in done.rows} == {"closed-form"}
+    assert any("left out: references through a network" in text for text in caplog.messages) == bool(asked)
 
 
 def test_a_comparison_of_nothing_in_particular_is_of_presets_on_conditions_with_and_without_a_rig() -> None:

@@ -64,9 +64,9 @@ def check_searched(names: Iterable[str]) -> None:
 def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
     """A comparison without the rows that want a tune run, and the inverse that wants a network, where none is given.
 
-    And what is left out, in words. Gains `tuned:worlds` are those shipped of the family that is compared on. Where
-    nothing would be left, and where a run is given that lacks some gains, the study stays as it is: what it lacks is an
-    error.
+    And what is left out that somebody asked for, in words. Gains `tuned:worlds` are those shipped of the family that is
+    compared on. Where nothing would be left, and where a run is given that lacks some gains, the study stays as it is:
+    what it lacks is an error.
     """
     from wristctl.control.shipped_gains import OF_WORLDS, PREFIX
 
@@ -84,7 +84,8 @@ def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
             settings = settings.model_copy(update={"rows": rows})
     inverses = tuple(inverse for inverse in settings.inverses if inverse != "network")
     if "network" not in inputs and inverses and inverses != settings.inverses and not settings.worlds.family:
-        left_out.append("references through a network (no train run is given)")
+        if "inverses" in settings.model_fields_set:  # else nobody asked for a network
+            left_out.append("references through a network (no train run is given)")
         settings = settings.model_copy(update={"inverses": inverses})
     return study if settings is study.compare else study.model_copy(update={"compare": settings}), left_out
 
