@@ -141,6 +141,11 @@ def _stream(log: OpenLog, names: Sequence[str]) -> tuple[Array, Array]:
     return time, values[there]
 
 
+def _as_well(least: float) -> float:
+    """Share of the motion that a shift may leave over that does as well as the best one."""
+    return max(_AS_WELL * least, least + _NO_WORSE)
+
+
 def _shift(streams: _Streams, motion: OpenLog, drive: OpenLog) -> tuple[_Shift, str]:
     """The shift of the motion's times, and a sentence on others that do as well. Raises UserError without one."""
     spans = [float(at[-1] - at[0]) for at in (streams.driven_at, streams.moved_at)]
@@ -150,13 +155,14 @@ def _shift(streams: _Streams, motion: OpenLog, drive: OpenLog) -> tuple[_Shift, 
     shifts = np.arange(first, streams.driven_at[-1] - streams.moved_at[0] - shared + step, step)
     left = np.array([streams.left_over(float(shift)) for shift in shifts])
     troughs = np.flatnonzero((left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:])) + 1
-    tried = {int(np.argmin(left)), *(int(k) for k in troughs if left[k] <= 1.0 - _SAID)}
+    lowest = 2.0 * left[troughs] - np.maximum(left[troughs - 1], left[troughs + 1])  # that a trough goes down to
+    tried = {int(np.argmin(left)), *map(int, troughs[lowest <= _as_well(float(left.min()))])}
     found = sorted((streams.trough(float(shifts[k]), step) for k in tried), key=lambda shift: shift.left)
     best, where = found[0], motion.header or str(motion.file)
     if not best.left <= 1.0 - _SAID:
         fix = "are both of one recording, and spools of all tendons there?"
         raise UserError(f"at no shift of clocks does its motion go with {drive.file.name}", where, fix)
-    most = max(_AS_WELL * best.left, best.left + _NO_WORSE)
+    most = _as_well(best.left)
     alike = [shift for shift in found if shift.left <= most and abs(shift.time - best.time) > step]
     if not alike:
         return best, ""
