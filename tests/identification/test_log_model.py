@@ -318,8 +318,13 @@ def test_a_wide_interval_is_not_identified(name: str, value: float, narrow: floa
 def test_logs_without_spools_or_motion_are_refused() -> None:
     log = planar()
     bare = {name: log.columns[name] for name in ("time", "bend_y")}
-    with pytest.raises(UserError, match="0 spools"):
+    with pytest.raises(UserError, match="no motors: neither spools"):
         robot_of_logs([OpenLog(log.file, "log", bare)], WRIST, 0.01)
+    alone = OpenLog(log.file, "log", bare | {"spool_2": log.columns["spool_2"]})
+    with pytest.raises(UserError, match="spool_2 is its only spool"):
+        robot_of_logs([alone], WRIST, 0.01)
+    with pytest.raises(UserError, match=r"its tendons are spool_2, and those of .* spool_1, spool_2"):
+        robot_of_logs([log, alone], WRIST, 0.01)
     still = {name: log.columns[name] for name in ("time", "spool_1", "spool_2")}
     with pytest.raises(UserError, match="neither a bend nor the tip"):
         robot_of_logs([OpenLog(log.file, "log", still)], WRIST, 0.01)

@@ -16,7 +16,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.log_model import robot_of_logs
-from wristctl.records.joined_logs import joined_logs
+from wristctl.records.joined_logs import check_whole, joined_logs
 from wristctl.records.log_looks import looked_at
 from wristctl.records.open_log import OpenLog
 
@@ -154,3 +154,14 @@ def test_logs_without_times_or_of_trials_are_not_joined() -> None:
     trials = OpenLog(seen.file, "log", seen.columns, {"trial": np.full(len(seen), "a")})
     with pytest.raises(UserError, match="pairs of files"):
         joined_logs([motors(), trials])
+
+
+def test_a_log_of_one_of_both_beside_a_whole_one_is_refused_by_what_it_lacks() -> None:
+    (whole,) = joined_logs([motors(), mocap(7.0)])
+    for logs in ([whole, mocap(1.0)], [mocap(1.0), whole]):
+        with pytest.raises(UserError, match=r"no motors of its own.* mocap\.csv"):
+            check_whole(logs)
+    with pytest.raises(UserError, match="no motion of its own"):
+        check_whole([motors(), whole])
+    for right in ([whole, whole], [motors()], [mocap(1.0)], [motors(), motors()]):
+        check_whole(right)

@@ -153,8 +153,8 @@ def _recording(
     if told.any():
         within &= (clock >= clock[told][0]) & (clock <= clock[told][-1])
     if min(within.sum(), told.sum()) < _FEWEST:
-        problem = f"{int(min(within.sum(), told.sum()))} samples of trial {name or file}"
-        raise UserError(problem, str(log.file), f"{_FEWEST} or more with {quantity}s and motion")
+        problem = f"{int(min(within.sum(), told.sum()))} samples of trial {name or file} have {quantity}s and motion"
+        raise UserError(problem, str(log.file), f"{_FEWEST} or more")
     kept = np.flatnonzero(within)
     kept = kept[:: max(1, math.ceil(len(kept) * trials / _MOST))]
     begin, end = clock[told][0], clock[told][-1]

@@ -51,8 +51,15 @@ def robot_of_logs(
     """
     log, numbers = logs[0], spools_of_log(logs[0])
     if len(numbers) < 2:
-        problem = f"{len(numbers)} spools, and the motion is that of two or more tendons"
-        fix = "columns spool_1 [mm], spool_2 [mm] beside the motion; or tension_1 [N] or current_1 [mA], ... of all"
+        if numbers:
+            problem = f"spool_{numbers[0]} is its only spool, and two or more tendons bend a wrist"
+            fix = "a column spool_2 [mm], ... for each other tendon; of a motor that winds both it is the negative"
+        else:
+            problem = "it has no motors: neither spools nor tensions or currents"
+            fix = (
+                "columns spool_1 [mm], spool_2 [mm], or tension_1 [N], or current_1 [mA], ... of all tendons, beside it"
+            )
+            fix += "; or the motors' log too, to join it to"
         raise UserError(problem, log.header or str(log.file), fix)
     _check_alike(logs, numbers)
     measured = _measured(log)
@@ -82,8 +89,9 @@ def _check_alike(logs: Sequence[OpenLog], numbers: Sequence[int]) -> None:
     """UserError where logs have other tendons, measure something else, or where only some have masses."""
     for log in logs:
         if spools_of_log(log) != numbers:
-            problem = f"tendons {', '.join(map(str, spools_of_log(log)))}, elsewhere {', '.join(map(str, numbers))}"
-            raise UserError(problem, str(log.file), "logs of one robot")
+            own, others = (", ".join(f"spool_{k}" for k in each) for each in (spools_of_log(log), numbers))
+            problem = f"its tendons are {own or 'none'}, and those of {logs[0].file.name} {others}"
+            raise UserError(problem, log.header or str(log.file), "logs of one robot, each with all of its spools")
         if _measured(log) != _measured(logs[0]):
             problem = f"the {_measured(log)}, in {logs[0].file.name} the {_measured(logs[0])}"
             raise UserError(problem, log.header or str(log.file), "logs that measure the same")
@@ -294,7 +302,7 @@ def _recording(
     fewest = int(min(*seen.sum(axis=0), counted.sum())) if seen.size else 0
     if fewest < _FEWEST:
         raise UserError(
-            f"{fewest} samples of trial {name or file}", str(log.file), f"{_FEWEST} or more with spools and motion"
+            f"{fewest} samples of trial {name or file} have spools and motion", str(log.file), f"{_FEWEST} or more"
         )
     most = max(_FEWEST, _MOST // trials)
     title = f"{file}, {name}" if name else file

@@ -93,6 +93,17 @@ def joined_logs(logs: Sequence[OpenLog]) -> list[OpenLog]:
     return [*whole, *(_joined(drive, motion) for drive, motion in zip(drives, motions, strict=True))]
 
 
+def check_whole(logs: Sequence[OpenLog]) -> None:
+    """UserError for a log of the motion alone, or of motors alone, beside one that has both."""
+    whole = next((log.file.name for log in logs if _drives(log) and _moves(log)), None)
+    for log in logs if whole else ():
+        has, lacks = ("motion", "motors") if _moves(log) else ("motors", "motion")
+        if not (_drives(log) and _moves(log)):
+            problem = f"it has no {lacks} of its own, and there is nothing to join it to: {whole} has motors and motion"
+            fix = f"leave this file out, or take the {has} out of {whole}"
+            raise UserError(problem, log.header or str(log.file), fix)
+
+
 def _drives(log: OpenLog) -> list[str]:
     return [f"{quantity}_{number}" for quantity in _DRIVES for number in log.tendons_of(quantity)]
 

@@ -82,7 +82,7 @@ class ReadLogs(NamedTuple):
 
 def logs_of(study: Study) -> list[OpenLog]:
     """The study's logs, read and looked at; those of motors and motion in files of their own are joined."""
-    from wristctl.records.joined_logs import joined_logs
+    from wristctl.records.joined_logs import check_whole, joined_logs
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
     from wristctl.wrist.tendon_layout import TendonLayout
@@ -97,7 +97,13 @@ def logs_of(study: Study) -> list[OpenLog]:
         looked_at(read_log(Path(file), own.strip(), "log", tendon_offset=offset), tendon_offset=offset)
         for file, own in zip(settings.logs, names, strict=True)
     ]
-    return [looked_at(log, tendon_offset=offset) if log.two_clocks else log for log in joined_logs(read)]
+    for log in read:
+        if not len(log):
+            fix = "the file of a whole recording: was this one cut short, or its program stopped at once?"
+            raise UserError("a header, and no samples below it", log.header or str(log.file), fix)
+    joined = joined_logs(read)
+    check_whole(joined)
+    return [looked_at(log, tendon_offset=offset) if log.two_clocks else log for log in joined]
 
 
 def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
