@@ -108,6 +108,21 @@ def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run,
     assert told[data.id] == [{"file": "data/x.txt", "problem": "hash does not match what was sealed"}]
 
 
+def test_a_run_that_was_broken_off_has_nothing_to_restore(call: Call, data: Run, network: Run) -> None:
+    """Nothing of it was ever sealed, and a run that was changed beside it is told of as before."""
+    manifest = network.path / "run.json"
+    manifest.write_text(manifest.read_text().replace('"state": "ok"', '"state": "running"'))
+    (network.path / "SHA256SUMS").unlink()
+    code, out, err = call("runs", "verify")
+    assert code == 3 and f"{network.id}  did not end, and was never sealed\n" in out and "SHA256SUMS" not in out
+    assert "1 of 2 runs did not end" in err and "restore" not in err and "not as they were sealed" not in err
+    (told,) = json.loads(call("runs", "verify", network.id, "--json")[1])["runs"][network.id]
+    assert told["file"] == "SHA256SUMS" and "did not end" in told["problem"]
+    (data.path / "data" / "x.txt").write_text("five")
+    err = call("runs", "verify")[2]
+    assert "1 of 2 runs are not as they were sealed" in err and "1 of 2 runs did not end" in err and "restore" in err
+
+
 def test_copies_of_a_run_and_one_that_cannot_be_read_are_each_verified(
     call: Call, data: Run, network: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,11 +50,16 @@ class Verified(NamedTuple):
     running: bool = False
     """The run is still running, and nothing of it is sealed yet."""
 
+    unsealed: bool = False
+    """The run was broken off before its end, and nothing of it was ever sealed."""
+
     @property
     def said(self) -> str:
         """The run in words."""
         if self.running:
             return "is running"
+        if self.unsealed:
+            return "did not end, and was never sealed"
         if all(file == SIGNATURE for file, _ in self.problems):
             return f"as sealed{', but nobody vouches for it' if self.problems else self.signed}"
         unread = [problem.startswith(UNREADABLE) for file, problem in self.problems if file != SIGNATURE]
@@ -95,10 +100,14 @@ def verify(
             run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
             checked[str(path) if run.id in checked else run.id] = _verified(run, must, signers)
             advance(count, changed=sum(verdict.fails(must) for verdict in checked.values()))
-    error, changed = None, sum(verdict.fails(must) for verdict in checked.values())
-    if changed:
-        problem = f"{changed} of {len(checked)} runs are not as they were sealed{' and signed' * must}"
-        error = UserError(problem, str(out), "restore the files named, or run the command again", exit_code=3)
+    failing = [verdict for verdict in checked.values() if verdict.fails(must)]
+    error, unsealed = None, sum(verdict.unsealed for verdict in failing)
+    if failing:
+        changed = len(failing) - unsealed
+        told = [f"{changed} of {len(checked)} runs are not as they were sealed{' and signed' * must}"] * bool(changed)
+        told += [f"{unsealed} of {len(checked)} runs did not end, and were never sealed"] * bool(unsealed)
+        fix = "restore the files named, or run the command again" if changed else "run the command again"
+        error = UserError("; ".join(told), str(out), fix, exit_code=3)
     if as_json:
         shown = {
             name: [{"file": file, "problem": problem} for file, problem in verdict.problems]
@@ -107,7 +116,7 @@ def verify(
         return print_json({"schema": "wristctl.verify/1", "runs": shown}, error)
     for name, verdict in checked.items():
         say(f"{name}  {verdict.said}")
-        for file, problem in () if verdict.running else verdict.problems:
+        for file, problem in () if verdict.running or verdict.unsealed else verdict.problems:
             say(f"  {file}: {problem}")
     if error:
         raise error
@@ -122,6 +131,8 @@ def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
         unreadable_seal = error.what.startswith(UNREADABLE)
         if running and not unreadable_seal:
             return Verified([(SUMS, "is not there yet: the run is running")], running=True)
+        if not unreadable_seal and _was_broken_off(run):
+            return Verified([(SUMS, "was never written: the run did not end")], unsealed=True)
         problems = [(SUMS, error.what if unreadable_seal else f"missing: the run is {run.state}")]
     except OSError as error:  # another user's, perhaps: the others are still checked
         problems = [(Path(error.filename or run.path).name, unreadable(error, run.path).what)]
@@ -131,6 +142,11 @@ def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
         return Verified([*problems, (SIGNATURE, "run is not signed")])
     by = signature(run, signers)
     return Verified([*problems, (SIGNATURE, by.fault)] if by.fault else problems, _by(by))
+
+
+def _was_broken_off(run: Run) -> bool:
+    """Whether its manifest still has it running, as a process that was killed left it."""
+    return run.state == "crashed" and run.manifest.state == "running"
 
 
 def _by(run_signature: RunSignature) -> str:
