@@ -123,6 +123,23 @@ def test_runs_are_chosen_by_what_was_asked(
     assert [row[0] for row in _rows(call("runs", "ls", *asked)[1])[1:]] == [runs[k].id for k in shown]
 
 
+@pytest.mark.parametrize("columns", [60, 110])
+def test_a_long_note_is_cut_to_the_terminal(call: Call, columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is room; those that were asked for by name are whole, and so is what fits."""
+    long, short = "the wrist buckles " * 20, "a tendon is slack"
+    for label, why in (("a", long.strip()), ("b", short)):
+        with pytest.raises(UserError), start_run("tune", Study(), label):
+            raise UserError(why)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    _, rule, first, second = call("runs", "ls")[1].splitlines()
+    at = rule.rindex(" ") + 1
+    assert max(len(rule), len(first), len(second)) == max(columns, at + 48)
+    assert first.endswith("...") and long.startswith(first[at:-3]) and second[at:] == short
+    assert long.strip() in call("runs", "ls", "--columns", "id,note")[1]
+    monkeypatch.setenv("COLUMNS", "1000")
+    assert long.strip() in call("runs", "ls")[1]
+
+
 def test_where_there_is_none_that_is_said(call: Call) -> None:
     assert call("runs", "ls") == (0, "no runs in results\n", "")
     for asked in (("--kind", "x"), ("--label", "x"), ("--state", "failed"), ("--tag", "x"), ("--newer", "1h")):

@@ -41,6 +41,28 @@ def network(data: Run) -> Run:
     return Run(live.path)
 
 
+def test_a_long_command_is_whole_and_no_line_under_the_run_is_longer_than_the_terminal(call: Call) -> None:
+    words = ["wristctl", "tune", *(f"--set wrist.x{k}=1" for k in range(30))]
+    with start_run("tune", Study(), "a", argv=words) as live:
+        live.metric("a_metric_whose_name_is_rather_long_and_stands_alone", 1.0)
+    lines = call("runs", "show", live.path.name)[1].splitlines()
+    (shown,) = [line for line in lines if line.startswith("command")]
+    assert "wrist.x29=1" in shown
+    rules = [line for line in lines if line and not line.strip("- ")]
+    assert max(map(len, rules)) == 80 and len(rules) == 3
+
+
+def test_verify_has_the_states_of_runs_below_each_other(call: Call, tmp_path: Path) -> None:
+    for kind, label in (("tune", ""), ("gen-data", "with-a-long-label"), ("train", "b")):
+        with start_run(kind, Study(), label) as live:
+            live.file("x.txt").write_text("whole")
+    (live.path / "x.txt").write_text("changed")
+    code, out, _ = call("runs", "verify")
+    runs = [line for line in out.splitlines() if not line.startswith("  ")]
+    assert code == 3 and len({len(line.split("  ")[0]) for line in runs}) > 1
+    assert len({line.index("as sealed" if "as sealed" in line else "changed") for line in runs}) == 1
+
+
 def test_show_tells_each_fact_metric_and_file(call: Call, data: Run, network: Run) -> None:
     code, out, _ = call("runs", "show", data.id)
     lines = [re.split(r"\s{2,}", line.strip()) for line in out.splitlines()]
@@ -86,7 +108,9 @@ def test_lineage_is_a_tree_and_its_users_as_lines_or_as_an_object(call: Call, da
 
 def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run, network: Run) -> None:
     with start_run("tune", Study(), "c") as live:
-        out = f"{data.id}  as sealed\n{network.id}  as sealed\n{live.id}  is running\n"
+        ids = (data.id, network.id, live.id)
+        wide = max(map(len, ids))
+        out = "".join(f"{each:{wide}}  {'is running' if each == live.id else 'as sealed'}\n" for each in ids)
         code, said, _ = call("runs", "verify")
         assert code == 0 and sorted(said.splitlines()) == sorted(out.splitlines()), "one that goes on is not wrong"
         told = json.loads(call("runs", "verify", "--json")[1])["runs"]
@@ -96,10 +120,11 @@ def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run,
     (network.path / "SHA256SUMS").unlink()
     code, out, err = call("runs", "verify", data.id, network.id)
     assert code == 3 and "2 of 2 runs are not as they were sealed" in err
+    wide = max(len(data.id), len(network.id))
     assert out.splitlines() == [
-        f"{data.id}  changed",
+        f"{data.id:{wide}}  changed",
         "  data/x.txt: hash does not match what was sealed",
-        f"{network.id}  changed",
+        f"{network.id:{wide}}  changed",
         "  SHA256SUMS: missing: the run is crashed",
     ]
     code, out, err = call("runs", "verify", "--json")
@@ -141,10 +166,11 @@ def test_copies_of_a_run_and_one_that_cannot_be_read_are_each_verified(
 
     monkeypatch.setattr(seal, "sha256_of", refuse)
     code, out, _ = call("runs", "verify", data.id, network.id)
+    wide = max(len(data.id), len(network.id))
     assert code == 3 and out.splitlines() == [
-        f"{data.id}  could not be checked",
+        f"{data.id:{wide}}  could not be checked",
         "  config.yaml: cannot be read: Permission denied",
-        f"{network.id}  as sealed",
+        f"{network.id:{wide}}  as sealed",
     ]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import shutil
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, fields, replace
 from typing import Annotated, Any, get_args
@@ -11,8 +12,9 @@ import typer
 from wristctl.cli.json_output import print_json
 from wristctl.cli.options import RESULTS, Json, Out, Ref, run_ids
 from wristctl.cli.output import say
-from wristctl.commands.printed_table import Table, number
+from wristctl.commands.printed_table import COLUMNS, Table, number
 from wristctl.errors import Argument, UserError, meant
+from wristctl.escape import printable
 from wristctl.reader_units import in_degrees
 from wristctl.records import Run, open_run
 from wristctl.records.difference import Change, difference
@@ -46,7 +48,10 @@ def ls(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List runs, oldest first: what each was about, and the metric that heads its page."""
+    """List runs, oldest first: what each was about, and the metric that heads its page.
+
+    Notes are cut to the width of the terminal; --columns id,note and --json have them whole.
+    """
     where = where or []
     indexed = entries(out)
     _check_choice("kind", kind, {entry.kind for entry in indexed})
@@ -63,13 +68,36 @@ def ls(
 
 
 def _table(listed: list[IndexEntry], asked: list[str]) -> Table:
-    """The listing, with the metrics that were asked for and the columns that hold something."""
+    """The listing, with the metrics that were asked for and the columns that hold something, as wide as the terminal.
+
+    It is wider where all but the notes are.
+    """
     metrics = sorted({name for entry in listed for name in entry.metrics} & set(asked))
     rows = [replace(entry, chief="") if entry.chief in metrics else entry for entry in listed]  # it has its column
     held = [name for name in ("about", "chief") if any(getattr(entry, name) for entry in rows)]
     columns = ["id", "kind", "state", "wall_s", *held, *metrics]
     columns += [name for name in ("tags", "note") if any(getattr(entry, name) for entry in rows)]
-    return _of_columns(rows, columns)
+    beyond = len(_rule(_of_columns(rows, columns))) - _terminal()
+    room = max(_NOTE, max(len(printable(entry.note)) for entry in rows) - beyond)
+    return _of_columns([replace(entry, note=_cut(entry.note, room)) for entry in rows], columns)
+
+
+# Letters of a note that are shown, at least.
+_NOTE = 48
+
+
+def _terminal() -> int:
+    return shutil.get_terminal_size((COLUMNS, 0)).columns
+
+
+def _rule(table: Table) -> str:
+    """The line under the heads of a table without a title."""
+    return table.text().split("\n")[1]
+
+
+def _cut(text: str, room: int) -> str:
+    whole = printable(text)
+    return text if len(whole) <= room else f"{whole[: room - 3]}..."
 
 
 def _chosen(listed: list[IndexEntry], columns: str) -> Table:
@@ -132,7 +160,8 @@ def show(
         say(line)
     print("\n" * bool(answer), end="")
     shown_tables = _run_tables(run, tags, metrics or not answer)
-    print("\n\n".join(table.text() for table in shown_tables), end="\n\n")
+    rule = _rule(shown_tables[0])  # as wide as the longest command
+    print("\n\n".join(table.text() for table in shown_tables).replace(rule, rule[: _terminal()], 1), end="\n\n")
     if answer and not metrics and run.metrics:
         say(f"{len(run.metrics)} metrics: wristctl runs show {shlex.quote(str(run.path))} --metrics")
     say(run.path)

@@ -114,8 +114,9 @@ def verify(
             for name, verdict in checked.items()
         }
         return print_json({"schema": "wristctl.verify/1", "runs": shown}, error)
+    width = max((len(name) for name in checked if os.sep not in name), default=0)  # paths of copies are much longer
     for name, verdict in checked.items():
-        say(f"{name}  {verdict.said}")
+        say(f"{name:{width}}  {verdict.said}")
         for file, problem in () if verdict.running or verdict.unsealed else verdict.problems:
             say(f"  {file}: {problem}")
     if error:
