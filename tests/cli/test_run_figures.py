@@ -120,7 +120,7 @@ def test_the_latest_of_a_label_is_found_and_told_apart(call: Call) -> None:
     out = call("runs", "ls")[1]
     assert "computed-torque/default, feedforward/default" in out and "best_sampled" in out
     shown = call("runs", "ls", "--columns", "id,label,best_sampled")[1].splitlines()
-    assert shown[0].split() == ["id", "label", "best_sampled"] and shown[2].split()[:2] == [first.id, "small"]
+    assert shown[0].split() == ["id", "label", "best_sampled", "[deg]"] and shown[2].split()[:2] == [first.id, "small"]
 
 
 def test_a_table_is_printed_whole_or_as_latex(call: Call) -> None:
