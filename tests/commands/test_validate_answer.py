@@ -138,17 +138,23 @@ def test_a_value_that_is_nothing_beside_its_interval_is_printed_as_nothing(value
     assert row[1] == shown
 
 
-@pytest.mark.parametrize("still", [0, 1])
-def test_the_figure_of_a_motion_has_the_bends_that_move_and_no_line_over_what_was_fitted(still: int) -> None:
+@pytest.mark.parametrize(("still", "timed"), [(0, True), (1, False)])
+def test_the_figure_of_a_motion_has_the_bends_that_move_and_no_line_over_what_was_fitted(
+    still: int, timed: bool
+) -> None:
+    """Each at its time."""
     measured = np.stack([np.arange(8.0), np.arange(8.0) ** 2], axis=1)
     measured[:, still] = 0.25
     asked = np.array([True, True, False, False, True, True, False, True])
-    recording = SimpleNamespace(measured=measured, asked=asked, name="all")
+    recording = SimpleNamespace(measured=measured, asked=asked, name="all", time=0.5 * np.arange(8.0))
     fit: Any = SimpleNamespace(recordings=[recording], errors=[np.full((8, 2), 0.5)])
-    of_bends: Any = SimpleNamespace(robot=SimpleNamespace(measured="bend"), scale=2.0, unit="deg", asked="part")
+    arc = SimpleNamespace(measured="bend", timed=timed)
+    of_bends: Any = SimpleNamespace(robot=arc, scale=2.0, unit="deg", asked="part")
     (axes,) = motion(of_bends, [fit]).axes
     assert axes.get_ylabel() == f"bend {'zy'[still]} [deg]"
+    assert axes.get_xlabel() == ("time [s]" if timed else "sample")
     points, line = axes.lines
+    np.testing.assert_array_equal(np.asarray(points.get_xdata()), recording.time[asked])
     np.testing.assert_array_equal(np.asarray(points.get_ydata()), 2.0 * measured[asked, 1 - still])
     drawn = np.asarray(line.get_ydata())
     assert list(np.flatnonzero(np.isnan(drawn))) == [2, 5], "a gap where samples between were fitted"

@@ -107,7 +107,9 @@ def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedMod
     findings.metric("error", error, robot.unit, "lower", chosen.score.blocks, (low, high), meaning)
     about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
     with session.drawing():
-        findings.figure("motion", motion, about, chosen.fits, caption="measured motion and prediction")
+        findings.figure(
+            "motion", motion, about, chosen.fits, caption="measured motion and prediction, where it was not fitted"
+        )
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"

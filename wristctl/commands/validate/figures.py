@@ -22,9 +22,10 @@ def _parts(fits: Sequence[ArcFit]) -> list[tuple[ArcFit, int]]:
 
 
 def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
-    """Measured and predicted coordinates [deg or mm] of the predicted samples, in their order.
+    """Measured and predicted coordinates [deg or mm] of the predicted samples, over time with gaps between them.
 
-    A coordinate that never moves, as the second bend of a log in one plane, is not drawn.
+    Recordings without times have their samples' numbers there. A coordinate that never moves, as the second bend of a
+    log in one plane, is not drawn.
     """
     parts = _parts(fits)
     names = ("y", "z") if robot.robot.measured == "bend" else ("x", "y", "z")
@@ -34,8 +35,8 @@ def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
     for column, (fit, k) in enumerate(parts):
         recording, wrong = fit.recordings[k], fit.errors[k]
         asked = recording.asked
-        across = np.arange(float(asked.sum()))
         gaps = np.flatnonzero(np.diff(np.flatnonzero(asked)) > 1) + 1  # between what is predicted other samples lie
+        across = recording.time[asked]
         for row, (name, at) in enumerate(axes_of):
             panel, measured = axes[row, column], robot.scale * recording.measured[asked, at]
             panel.plot(across, measured, ".", color=GREY, markersize=2.5, label="measured")
@@ -45,7 +46,7 @@ def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
                 what = "bend" if robot.robot.measured == "bend" else "tip"
                 panel.set_ylabel(f"{what} {name} [{robot.unit}]")
         title(axes[0, column], recording.name if recording.name != "all" else robot.asked)
-        axes[-1, column].set_xlabel("predicted sample")
+        axes[-1, column].set_xlabel("time [s]" if robot.robot.timed else "sample")
     legend_below(picture)
     return picture
 
