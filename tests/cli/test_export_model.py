@@ -166,3 +166,8 @@ def test_what_cannot_be_written_is_said(call: Call, identified: Run, arguments: 
     Path("wrist.xml").write_text("mine")
     code, _, err = call("export-model", *arguments)
     assert code == 2 and what in err and Path("wrist.xml").read_text() == "mine"
+
+
+def test_a_program_that_is_none_of_those_there_are_is_told_in_plain_words(call: Call) -> None:
+    code, _, err = call("export-model", "latest", "--to", "simulink")
+    assert code == 2 and "'--to': 'simulink' is not one of 'mujoco', 'matlab', 'urdf'" in err

@@ -117,7 +117,8 @@ def main() -> NoReturn:
             code = _failed(error, error)
         except typer.TyperException as error:
             command = getattr(getattr(error, "ctx", None), "command_path", "wristctl")
-            told = UserError(error.format_message(), command, f"{command} --help", error.exit_code)
+            what = error.format_message().replace("Value error, ", "")  # pydantic's, in typer's own words
+            told = UserError(what, command, f"{command} --help", error.exit_code)
             code = _failed(error, told, f"{told.what} - fix: {told.fix}")
         except (KeyboardInterrupt, typer.Abort):
             code = _interrupted()
