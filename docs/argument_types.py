@@ -19,7 +19,7 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Push, Sensor
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.wrist import TendonPlace, WristParameters
-from wristctl.study_files.keys import field_at, section_keys, unit_of
+from wristctl.study_files.keys import field_at, keys_of, section_keys, unit_of
 from wristctl.study_files.resolved import sections_read
 
 FILE = Path(__file__).parents[1] / "wristctl" / "arguments.py"
@@ -91,11 +91,14 @@ def typed(kind: Any, shown: dict[type[Section], None]) -> str:
     return str(kind.__name__)
 
 
-def leaves(keys: Sequence[tuple[str, Any]], shown: dict[type[Section], None]) -> Iterator[str]:
-    """A line for each key."""
+def leaves(
+    keys: Sequence[tuple[str, Any]], shown: dict[type[Section], None], of_function: bool = False
+) -> Iterator[str]:
+    """A line for each key; a function takes a group with a `kind` by the name of that alone."""
     for key, field in keys:
         unit = unit_of(field)
-        yield f"    {key}: {typed(field.annotation, shown)}" + f"  # {unit}" * bool(unit)
+        by_name = " | str" if of_function and "kind" in keys_of(field.annotation) else ""
+        yield f"    {key}: {typed(field.annotation, shown)}{by_name}" + f"  # {unit}" * bool(unit)
 
 
 def functions(shown: dict[type[Section], None]) -> Iterator[str]:
@@ -109,7 +112,7 @@ def functions(shown: dict[type[Section], None]) -> Iterator[str]:
             field = field_at((section.replace("_", "-"),))[1]
             if field is not None and section not in own and section != name:
                 keys.append((section, field))
-        lines = list(leaves(keys, shown))
+        lines = list(leaves(keys, shown, of_function=True))
         title = "".join(part.capitalize() for part in name.split("_"))
         text = f'class {title}Arguments(SharedArguments, total=False):\n    """Keywords of `{name}`."""\n'
         yield "\n".join([text, *lines])

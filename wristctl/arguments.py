@@ -272,7 +272,7 @@ class SimulateArguments(SharedArguments, total=False):
     controller: str
     gains: str | Mapping[str, float]
     loop: LoopKeys
-    reference: ReferenceKeys
+    reference: ReferenceKeys | str
     direction: Literal["ulnar", "radial", "flexion", "extension"]
     start: Literal["straight", "equilibrium"]
     horizon: float  # s
@@ -288,7 +288,7 @@ class AnalyseArguments(SharedArguments, total=False):
     controller: str
     gains: str | Mapping[str, float]
     loop: LoopKeys
-    reference: ReferenceKeys
+    reference: ReferenceKeys | str
     direction: Literal["ulnar", "radial", "flexion", "extension"]
     start: Literal["straight", "equilibrium"]
     horizon: float  # s
@@ -365,7 +365,7 @@ class HwRunArguments(SharedArguments, total=False):
     push: PushKeys
     push_toward_deg: float | None  # deg
     without_push: bool
-    reference: ReferenceKeys
+    reference: ReferenceKeys | str
     horizon: float  # s
     payload: float  # kg
     tension_factor: float

@@ -92,6 +92,11 @@ def test_the_wrist_of_a_file_is_taken_and_its_other_sections_are_not(tmp_path: P
     [
         ("simulate", {"wrist": {"lenght": 0.09}}, ["'lenght'", "simulate(wrist=...)", "wrist.lenght", "'length'?"]),
         ("simulate", {"wrsit": {}}, ["unknown argument 'wrsit'", "did you mean 'wrist'?"]),
+        ("simulate", {"length": 0.09}, ["unknown argument 'length'", "did you mean wrist={'length': ...}?"]),
+        ("simulate", {"angle_deg": 5.0}, ["did you mean reference={'angle_deg': ...}?"]),
+        ("simulate", {"reference": "circumductoin"}, ["simulate(reference='circumductoin')", "'circumduction'?"]),
+        ("tune", {"controllers": ["pid-ff/hardware"]}, ["tune.controllers.0", "fix: the name alone: pid-ff"]),
+        ("tune", {"controllers": ["pid-fff/hardware"]}, ["'pid-fff/hardware' is not one of the choices"]),
         ("simulate", {"contoller": "smc"}, ["unknown argument", "did you mean 'controller'?"]),
         ("simulate", {"controller": "ct-dop"}, ["simulate(controller='ct-dop')", "did you mean 'ct-dob'?"]),
         ("simulate", {"train": {"epochs": 3}}, ["simulate does not read train"]),
@@ -109,3 +114,20 @@ def test_what_no_study_has_is_told_with_the_argument_and_what_was_meant(
         read_study(command=command, keywords=keywords)
     raised.value.in_python = True
     assert not [word for word in words if word not in str(raised.value)], raised.value
+
+
+def test_a_name_alone_stands_for_a_list_of_one_or_for_a_group_of_that_kind() -> None:
+    def read(command: str, **keywords: Any) -> Any:
+        return getattr(read_study(command=command, keywords=keywords)[0], command.replace("-", "_"))
+
+    assert read("simulate", reference="circumduction").reference.kind == "circumduction"
+    assert read("hw-run", reference="step").reference.kind == "step"
+    assert [row.label for row in read("compare", controllers="pid-ff/hardware").rows] == ["pid-ff/hardware"]
+    assert read("tune", controllers="adrc").controllers == ("adrc",)
+    assert read("compare", directions="radial").directions == ("radial",)
+    swept, _ = read_study(command="simulate", keywords={"sweep": "wrist.length=0.08,0.09"})
+    assert swept.sweep == ("wrist.length=0.08,0.09",)
+    with pytest.raises(UserError, match=r"analyse\.angles_deg"):
+        read("analyse", angles_deg="10")
+    whole, _ = read_study(command="simulate", keywords={"wrist": {"tendons": "three"}})
+    assert whole.wrist.tendons == "three"

@@ -53,6 +53,11 @@ def test_an_override_is_relative_to_the_command_first() -> None:
     [
         ("train:\n  epoch: 3\n", "unknown key 'epoch' - {file}:2: train.epoch - fix: did you mean 'epochs'?"),
         ("trian: {}\n", "unknown key 'trian' - {file}:1: trian - fix: did you mean 'train'?"),
+        ("seed: 1\nlength: 0.1\n", "unknown key 'length' - {file}:2: length - fix: did you mean 'wrist.length'?"),
+        ("plant_segments: 2\n", "unknown key 'plant_segments' - {file}:1: plant_segments - fix: one of analyse, "),
+        ("wrist:\n  length:\n", "a value is missing - {file}:2: wrist.length"),
+        ("wrist:\n  length: 0,095\n", "decimal comma - {file}:2: wrist.length - fix: with a point: 0.095"),
+        ("wrist:\n  discs: 4,5\n", "decimal comma - {file}:2: wrist.discs"),
         ("gen_data: {}\n", "did you mean 'gen-data'?"),
         ("wrist:\n\n  mass: -0.1\n", "-0.1 should be greater than 0 - {file}:3: wrist.mass - fix: "),
         ("wrist: {mass: .nan}\n", "nan should be a finite number - {file}:1: wrist.mass"),
@@ -278,3 +283,56 @@ def test_text_of_another_form_is_refused_with_the_form_in_words() -> None:
     with pytest.raises(UserError, match=r"'5005' has another form .*HOST:PORT") as caught:
         load_study([], ["simulate.reference={kind: live, listen: '5005'}"])
     assert "pattern" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "typed", "meant"),
+    [
+        ("simulate", "length=0.1", "wrist.length=0.1"),
+        ("train", "stiffness=0.7", "wrist.stiffness=0.7"),
+        ("simulate", "angle_deg=20", "simulate.reference.angle_deg=20"),
+        ("hw-run", "plant.length=0.1", "hw-run.bench.plant.length=0.1"),
+        ("simulate", "plant.length=0.1", "simulate.loop.plant.length=0.1"),
+        (None, "tendon_radius=0.01", "wrist.tendon_radius=0.01"),
+    ],
+)
+def test_a_key_that_stands_too_high_is_found_below(command: str | None, typed: str, meant: str) -> None:
+    with pytest.raises(UserError, match="unknown key") as caught:
+        load_study([], [typed], command)
+    assert caught.value.fix == f"did you mean '{meant.partition('=')[0]}'?"
+    assert load_study([], [meant], command) != load_study([], [], command)
+
+
+def test_a_key_of_several_groups_is_none_of_them() -> None:
+    """`simulate` has a level of motors and one of sensors, further down, and an objective's are no key of it."""
+    for key in ("level=tendon", "chattering=1"):
+        with pytest.raises(UserError, match=r"fix: one of analyse, .* controller, ") as caught:
+            load_study([], [key], "simulate")
+        assert "did you mean" not in caught.value.fix
+
+
+def test_code_in_place_of_a_study_file_is_told_how_its_controller_is_given(tmp_path: Path) -> None:
+    own = tmp_path / "pid_grav.py"
+    own.write_text("PID_GRAV = Controller(name='pid-grav')\n")
+    with pytest.raises(UserError, match="is no study file") as caught:
+        load_study([own], [], "simulate")
+    assert caught.value.fix == f"its controller: --controller {own}:PID_GRAV"
+    caught.value.in_python = True
+    assert caught.value.fix == f"its controller: simulate(controller='{own}:PID_GRAV')"
+    with pytest.raises(UserError, match="holds keys and values"):
+        load_study([own], [], "train")
+
+
+def test_a_file_that_is_not_there_is_likened_by_its_own_name_and_not_by_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("four.yaml", "mywrist.yaml"):
+        Path(name).write_text("seed: 1\n")
+    with pytest.raises(UserError) as unlike:
+        load_study([Path("nosuch.yaml")])
+    assert "four" not in unlike.value.fix and unlike.value.fix.startswith("one of ")
+    for near in ("mywrst.yaml", "mywrist"):
+        with pytest.raises(UserError) as alike:
+            load_study([Path(near)])
+        assert alike.value.fix == "did you mean 'mywrist.yaml'?"

@@ -71,6 +71,9 @@ class OneOf:
         elif self.table.group and name.endswith(".py"):
             context = {"file": name, "what": self.table.what}
             raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", context)
+        elif self.table.group and name not in self.table and (alone := name.partition("/")[0]) in self.table:
+            context = {"name": name, "fix": f"the name alone: {alone}"}
+            raise PydanticCustomError("added_value", "{name} has gains, and no gains stand here", context)
         elif name in self.table.made and name not in self.table:
             problem, fix = self.table.made[name]
             raise PydanticCustomError("added_value", "{problem}", {"problem": problem, "fix": fix})

@@ -12,11 +12,15 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Keyword, Phrase, Setting, UserError, meant, nearest
 from wristctl.study_files.keys import field_at, keys_of, unit_of
+from wristctl.study_files.resolved import key_below
 from wristctl.study_files.strict_yaml import KeyPath
 
 
-def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> UserError:
-    """The most telling of the errors found; `origins` says the file and line (or override) of each key."""
+def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase], command: str | None = None) -> UserError:
+    """The most telling of the errors found; `origins` says the file and line (or override) of each key.
+
+    A key that stands too high is looked for in what `command` reads, or in all.
+    """
     details = error.errors(include_url=False)
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
     detail: Any = unknown[0] if unknown else max(details, key=lambda entry: len(entry["loc"]))
@@ -28,7 +32,8 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> User
         elif path and (isinstance(key, int) or field_at((*section_path, key))[1] is not field_at(section_path)[1]):
             section_path = (*section_path, key)
     where = (origins[path], f": {'.'.join(map(str, section_path))}") if path else ""
-    return UserError(_what(detail), where, _fix(detail))
+    below = key_below(str(path[0]), command) if unknown and len(path) == 1 else ""
+    return UserError(_what(detail), where, f"did you mean {below!r}?" if below else _fix(detail))
 
 
 def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
@@ -81,6 +86,10 @@ def _what(detail: Any) -> str:
         return f"{value} is not one of the choices"
     if _has_unit(detail):
         return f"{value} is a number with a unit"
+    if _decimal_comma(detail):
+        return f"{value} has a decimal comma"
+    if detail["input"] is None and detail["type"].endswith("_type"):
+        return "a value is missing"
     if _as_keys(detail):
         key = next(iter(detail["input"]))
         return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
@@ -117,6 +126,8 @@ def _fix(detail: Any) -> str:
     if _has_unit(detail):
         unit = unit_of(field) if field else ""
         return "give the number without its unit" + f", in {unit}" * bool(unit)
+    if _decimal_comma(detail):
+        return f"with a point: {detail['input'].replace(',', '.')}"
     if field is None or not field.description:
         return ""
     unit, default = unit_of(field), repr(field.default)
@@ -157,6 +168,12 @@ def _has_unit(detail: Any) -> bool:
     """Whether a text was given where a number stands, and is one with its unit: 0.095m."""
     number = detail["type"].startswith(("float_", "int_")) and isinstance(detail["input"], str)
     return number and _NUMBER_WITH_UNIT.match(detail["input"]) is not None
+
+
+def _decimal_comma(detail: Any) -> bool:
+    """Whether a text was given where a number stands, and is one with a comma: 0,095."""
+    number = detail["type"].startswith(("float_", "int_")) and isinstance(detail["input"], str)
+    return number and re.fullmatch(r"[-+]?\d+,\d+(e[-+]?\d+)?", detail["input"], re.IGNORECASE) is not None
 
 
 def _as_keys(detail: Any) -> bool:

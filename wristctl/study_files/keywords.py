@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, get_args, get_origin
 
+from wristctl.config.controller_row import Row
 from wristctl.config.section import Section
 from wristctl.config.study import Study
 from wristctl.errors import Keyword, UserError, meant
-from wristctl.study_files.keys import home_of, keys_of, section_keys
-from wristctl.study_files.resolved import check_read
+from wristctl.study_files.keys import field_at, home_of, keys_of, section_keys
+from wristctl.study_files.resolved import check_read, key_below
 from wristctl.study_files.strict_yaml import KeyPath
 
 
@@ -32,12 +33,26 @@ def path_of(name: str, command: str) -> KeyPath:
     known = {key.replace("-", "_"): key for key in (*sections, *own)}
     where = Keyword(f"{name}=...", function=function_of(command))
     if name not in known:
-        raise UserError(f"unknown argument {name!r}", where, meant(name, known))
+        section, _, inner = key_below(name, command).removeprefix(f"{command}.").rpartition(".")
+        fix = f"did you mean {section}={{{inner!r}: ...}}?" if section in known else meant(name, known)
+        raise UserError(f"unknown argument {name!r}", where, fix)
     key = known[name]
     if key in own:
         return home_of(command, key), key
     check_read(key, command, where)
     return (key,)
+
+
+def in_full(value: Any, path: KeyPath) -> Any:
+    """A text where a list of names stands, or a group with a `kind`, as such a list or group."""
+    if not isinstance(value, str):
+        return value
+    kind, (item, fields) = field_at(path)[0], (field_at((*path, 0))[0], keys_of(field_at(path)[0]))
+    if "kind" in fields:
+        return {"kind": value}
+    item = get_args(item)[0] if get_origin(item) is Annotated else item
+    named = item in (str, Row) or get_origin(item) is Literal
+    return (value,) if get_origin(kind) is tuple and named else value
 
 
 def as_a_file_has_it(value: Any, where: Keyword) -> Any:

@@ -20,7 +20,7 @@ from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
 from wristctl.study_files.error_messages import check_sizes, explained
 from wristctl.study_files.keys import field_at, keys_of, section_keys, whole_key
-from wristctl.study_files.keywords import as_a_file_has_it, keyword, path_of
+from wristctl.study_files.keywords import as_a_file_has_it, function_of, in_full, keyword, path_of
 from wristctl.study_files.renaming import (
     NewNames,
     leave_out_removed,
@@ -28,11 +28,11 @@ from wristctl.study_files.renaming import (
     with_keys_of_today,
     with_loops_of_today,
 )
-from wristctl.study_files.resolved import check_mode, check_read
+from wristctl.study_files.resolved import check_mode, check_read, key_below
 from wristctl.study_files.shipped import shipped_name, shipped_names, studies_beside, study_file
 from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
-from wristctl.study_files.typed_controllers import put_in
+from wristctl.study_files.typed_controllers import named_in, put_in
 
 # The key of a study file that names others, which are read before it.
 INCLUDE = "include"
@@ -89,6 +89,9 @@ def read_study(
         if path is None:
             problem = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
             raise UserError(problem, str(file), _in_place_of(str(file), files, command))
+        if path.suffix == ".py" and "controller" in section_keys(command):
+            own = named_in(path)
+            raise UserError(f"{file} is no study file", str(file), ("its controller: ", _as_controller(own, command)))
         _merge_file(data, path, origins, (), former)
     leave_out_removed(data, origins)
     for override in overrides:
@@ -106,7 +109,7 @@ def read_study(
     try:
         study = Study.model_validate(data, by_alias=True, by_name=False)
     except ValidationError as error:
-        raise explained(error, origins) from error
+        raise explained(error, origins, command) from error
     _refuse_horizon_of_worlds(study, origins, command)
     check_mode(study, command, origins)
     if for_another:
@@ -133,15 +136,22 @@ def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phras
     """Advice where there is no such study file: how controllers are given, where it has the name of one."""
     keys = section_keys(command)
     if file not in CONTROLLERS or not keys.keys() & {"controller", "controllers"}:
-        own = nearest(file, studies_beside(Path(file)))
+        beside = {name.removesuffix(".yaml"): name for name in studies_beside(Path(file))}
+        own = beside.get(nearest(file.removesuffix(".yaml"), beside) or "")
         return f"did you mean {own!r}?" if own else meant(shipped_name(Path(file)), shipped_names())
     if "controller" in keys:
-        return (f"{file} is a controller: ", Setting(f"controller={file}", option=f"--controller {file}"))
+        return (f"{file} is a controller: ", _as_controller(file, command))
     names = [str(other) for other in files if str(other) in CONTROLLERS]
+    in_python = f"controllers={names!r}"
     if keys_of(field_at((command or "", "controllers", 0))[0]):
         names = [f"{{controller: {name}, gains: {_a_preset(name)}}}" for name in names]
-    given = Setting(f"controllers=[{', '.join(names)}]", command or "", quoted=True)
-    return (f"{file} is a controller: ", given)
+    option = Setting(f"controllers=[{', '.join(names)}]", quoted=True).typed
+    return (f"{file} is a controller: ", Keyword(in_python, option=option, function=function_of(command or "")))
+
+
+def _as_controller(name: str, command: str | None) -> Keyword:
+    """How a command, or its function, is given its controller."""
+    return Keyword(f"controller={name!r}", option=f"--controller {name}", function=function_of(command or ""))
 
 
 def _a_preset(name: str) -> str:
@@ -180,7 +190,7 @@ def _merge_keyword(
     if name == "wrist" and isinstance(value, str | Path):
         _merge_wrist(data, origins, Path(value), where, former)
         return
-    whole = as_a_file_has_it(value, where)
+    whole = in_full(as_a_file_has_it(value, where), path)
     for key in reversed(path):
         whole = {key: whole}
     _merge(data, _today(Document(whole, {}), where, None, former), where, origins)
@@ -242,7 +252,9 @@ def _override(where: Setting, command: str | None) -> Document:
     keys = whole_key(dotted, command).split(".")
     command_keys, top = section_keys(command), keys_of(Study)
     if key_today(tuple(keys))[0] not in top:
-        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*command_keys, *top])))
+        below = ".".join([key_below(keys[0], command), *keys[1:]]) if key_below(keys[0], command) else ""
+        fix = f"did you mean {below!r}?" if below else meant(keys[0], dict.fromkeys([*command_keys, *top]))
+        raise UserError(f"unknown key {keys[0]!r}", where, fix)
     if command is not None:
         check_read(".".join(map(str, key_today(tuple(keys)))), command, where)
     try:

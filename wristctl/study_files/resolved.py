@@ -15,7 +15,18 @@ from wristctl.config.plant import is_unsaid
 from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.study import Study
 from wristctl.errors import Phrase, Setting, UserError
-from wristctl.study_files.keys import NO_COMMANDS, SUBJECTS, choices_of, command_of, keys_of, source_of, unit_of
+from wristctl.study_files.keys import (
+    NO_COMMANDS,
+    SUBJECTS,
+    choices_of,
+    command_of,
+    field_at,
+    home_of,
+    keys_of,
+    section_keys,
+    source_of,
+    unit_of,
+)
 from wristctl.study_files.strict_yaml import KeyPath, parse_yaml
 
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
@@ -64,6 +75,17 @@ def check_read(key: str, command: str, where: Phrase) -> None:
     if within := _WITHIN.get((command, section)):
         fix = f"{within}{key.removeprefix(section)}: the search that {command} makes itself, of gains: tuned; {fix}"
     raise UserError(f"{command_of(command)} does not read {key}", where, fix)
+
+
+def key_below(key: str, command: str | None) -> str:
+    """The dotted key of this name one level below a study's or a command's own, the wrist's first; empty where there
+    are none or several among what the command reads."""
+    if key in keys_of(field_at(("wrist",))[0]):
+        return f"wrist.{key}"
+    sections = [(name,) for name in (_keys(command) if command else keys_of(Study))]
+    groups = [(home_of(command, own), own) for own in section_keys(command)] if command else []
+    found = [(*group, key) for group in [*sections, *groups] if key in keys_of(field_at(group)[0])]
+    return ".".join(found[0]) if len(found) == 1 else ""
 
 
 def check_mode(study: Study, command: str | None, origins: Mapping[KeyPath, Phrase]) -> None:

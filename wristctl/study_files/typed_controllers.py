@@ -60,7 +60,7 @@ def _is_controller(argument: str) -> bool:
     if named or (study is not None and study.suffix != ".py"):
         return named
     if argument.endswith(".py"):
-        raise UserError(f"{argument} should name its controller", argument, _named_in(Path(argument)))
+        raise UserError(f"{argument} should name its controller", argument, named_in(Path(argument)))
     raise UserError(f"'{argument}' is neither a controller nor a study file", "", _neither(argument))
 
 
@@ -81,7 +81,7 @@ def _neither(argument: str) -> Phrase:
     names += [f"{name}/{gains}" for name in CONTROLLERS.known() if stroke]
     best = argument + ".yaml" if argument + ".yaml" in studies else nearest(argument, names)
     if own := _own_file(argument):
-        best = _named_in(own)
+        best = named_in(own)
     every: Phrase = ("controllers: `", Call("list controllers"), "`; a study file ends in .yaml")
     return (f"did you mean '{best}'? ", every) if best else every
 
@@ -92,7 +92,7 @@ def _own_file(argument: str) -> Path | None:
     return next((file for file in beside if plain(file.stem) == plain(Path(argument).name)), None)
 
 
-def _named_in(file: Path) -> str:
+def named_in(file: Path) -> str:
     """FILE:NAME of the first controller that a Python file makes, which is read and not run; else of NAME itself."""
     try:
         statements = ast.parse(file.read_bytes()).body
