@@ -52,6 +52,7 @@ from wristctl.records import open_run as _open_run
 from wristctl.study_files.keys import keys_of
 from wristctl.study_files.load import load_study as _load_study
 from wristctl.study_files.load import read_study
+from wristctl.study_files.typed_controllers import STUDIES
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -272,6 +273,7 @@ def identify(
 ) -> Told:  # fmt: skip
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
 
+    `study` may name runs too: what is `latest:...`, or has the end of a file other than a study's, is taken for `runs`.
     A run that is a file is an open log (documentation: The open log): the result then is a `LogTold`, what such logs
     tell, of a log of tensions or currents a `DrivenTold`, with `model="wrist"` a `BendsTold`, what logs in two planes
     tell of the study's wrist, or with `model="hysteresis"` a `LoopTold`, what a loop of tension and angle tells.
@@ -283,6 +285,9 @@ def identify(
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     `settings` are sections or keys of a study, on top of `study`.
     """
+    is_text = runs is None and isinstance(study, str | Path)
+    if is_text and (str(study).startswith("latest:") or Path(str(study)).suffix not in ("", *STUDIES)):
+        study, runs = None, study
     several = [runs] if isinstance(runs, str | Path | Run) else list(runs or ())
     named = [str(each.path if isinstance(each, Run) else each) for each in several]
     every: Mapping[str, object] = {**settings, "runs": named} if named else settings

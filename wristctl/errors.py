@@ -96,6 +96,8 @@ class Call:
     file: str = ""
     """a study file"""
     arguments: tuple[Argument, ...] = ()
+    kept: bool = False
+    """whether it is to leave a run, for which a function needs a folder"""
 
     @property
     def typed(self) -> str:
@@ -111,7 +113,8 @@ class Call:
             return self.typed
         study = f"load_study({self.file!r})" if self.file else "study"
         given = [study] if name != "runs" else []
-        return f"wristctl.{name}({', '.join([*given, *(each.in_python for each in self.arguments)])})"
+        arguments = [*self.arguments, OUT] if self.kept else self.arguments
+        return f"wristctl.{name}({', '.join([*given, *(each.in_python for each in arguments)])})"
 
 
 OUT = Argument("out", metavar="")

@@ -108,7 +108,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content:
         raise UserError(
             f"{a_run(actual_kind)} where {a_run(kind)} is needed", str(run.path), f"for example latest:{kind}"
         )
-    again = ("run `", Call(command_of(actual_kind)), "` again")
+    again = ("run `", Call(command_of(actual_kind), kept=True), "` again")
     if run.state != "ok":
         why = f": {run.manifest.error.what}" if run.manifest.error else ""
         raise UserError(f"run is {run.state}, not ok{why}", str(run.path), again)
@@ -147,7 +147,7 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
     if latest is None and content and empty:
         problem = f"no {kind} run that ended ok holds a {content.what} ({content.named})"
-        raise UserError(problem, f"{ref} in {results}", ("run `", Call(command_of(kind)), "` again"))
+        raise UserError(problem, f"{ref} in {results}", ("run `", Call(command_of(kind), kept=True), "` again"))
     if latest is None:
         if asked:
             last = max(asked, key=lambda run: run.started)
@@ -167,7 +167,7 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
         fix: Phrase = meant(kind, kinds)
         if is_command(kind) or not kinds:
             logs = (Argument("runs", "LOG", positional=True),) if kind == "identify" else ()
-            fix = ("run `", Call(command_of(kind), arguments=logs), "` first")
+            fix = ("run `", Call(command_of(kind), arguments=logs, kept=True), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     later = [run for run in asked if run.started > latest.started]
     if later:
