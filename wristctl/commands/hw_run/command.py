@@ -178,14 +178,8 @@ def _dare(session: Session, danger: str, fix: str) -> None:
 
 
 def _with_planes(study: Study) -> Study:
-    """The study with as many planes as its trials need, by which a calibration is chosen; of a rig its facts say it.
-
-    One that no board can wind is refused later, with what takes its tendons.
-    """
-    try:
-        return with_planes(study) if study.hw_run.rig is None else study
-    except UserError:
-        return study
+    """The study of a board with as many planes as its trials need, by which a calibration is chosen."""
+    return with_planes(study) if study.hw_run.calibration and study.hw_run.rig is None else study
 
 
 def _in_one_plane(study: Study) -> bool:
