@@ -178,8 +178,18 @@ def _dare(session: Session, danger: str, fix: str) -> None:
 
 
 def _with_planes(study: Study) -> Study:
-    """The study of a board with as many planes as its trials need, by which a calibration is chosen."""
-    return with_planes(study) if study.hw_run.calibration and study.hw_run.rig is None else study
+    """The study of a board with as many planes as its trials need, by which a calibration is chosen.
+
+    What a board cannot wind, or not so, is refused later, with what takes its tendons.
+    """
+    if study.hw_run.rig is not None or not (
+        study.wrist.tendons in ("four", "five") or wound_in_both_planes(study.wrist)
+    ):
+        return study
+    try:
+        return with_planes(study)
+    except UserError:
+        return study
 
 
 def _in_one_plane(study: Study) -> bool:
