@@ -241,6 +241,19 @@ def test_masses_are_asked_for_only_where_the_logs_have_not_several_and_no_tensio
     assert ("several masses" in " ".join(said.split())) == asks_for_masses
 
 
+def test_a_delay_at_its_lower_bound_is_told_as_that() -> None:
+    """A rig that dates its bends too early shows no other."""
+    logs = [planar()]
+    robot = robot_of_logs(logs, WRIST, 0.01)
+    model = next(iter(tried_models(robot, [recordings_of_logs(logs, robot)], False)))
+    fit = model.fits[0]
+    for value, high, bound in ((2e-6, 0.036, True), (0.003, 0.008, False), (2e-6, math.inf, False)):
+        delay = fit.told["delay"]._replace(value=value, low=0.0, high=high)
+        with patch.dict(vars(fit), told={**fit.told, "delay": delay}):
+            said = " ".join(" ".join(told_answer(fit, [model], model).lines()).split())
+        assert ("at its lower bound" in said and "dated too early" in said) == bound
+
+
 def test_what_a_log_does_not_tell_is_named_with_the_motions_that_would() -> None:
     logs = [planar()]
     robot = robot_of_logs(logs, WRIST, 0.01)

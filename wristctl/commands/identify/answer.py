@@ -11,6 +11,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, joined, number
 
 if TYPE_CHECKING:
+    from wristctl.identification.arc_fit import Told
     from wristctl.identification.fit import Fit
     from wristctl.identification.identifiability import Addition
     from wristctl.identification.intervals import Knowledge
@@ -34,6 +35,21 @@ def recommendation_by_ratios(run: str, scaled: bool) -> list[str]:
     return [
         f"Next, find its gains{_OWN}; VALUE is its bending stiffness in N m/rad, measured or known:",
         f"$ {command} --set wrist.stiffness=VALUE",
+    ]
+
+
+# Delay [s] below which a fit has ended at none, the least that it looks for.
+_NO_DELAY = 1e-4
+
+
+def bound_of_delay(told: Mapping[str, Told]) -> list[str]:
+    """A sentence where the delay is at the bound of the search: none, or a negative one that no wrist has."""
+    delay = told.get("delay")
+    if delay is None or not delay.known or delay.value > _NO_DELAY:
+        return []
+    return [
+        "The delay is at its lower bound, 0, and its interval is worth no more: unless bends are read at once, they "
+        "are dated too early or the motors too late, and other parameters make up for it. See to the clocks first."
     ]
 
 

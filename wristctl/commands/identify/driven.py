@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.identify.answer import recommendation_by_ratios
+from wristctl.commands.identify.answer import bound_of_delay, recommendation_by_ratios
 from wristctl.commands.inputs import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
 from wristctl.commands.quantities import MEANT, keep_told, told_frame, told_table
@@ -152,7 +152,7 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> An
     if untold:
         what = "; ".join(motions_for(untold))
         notes.append(f"Not identifiable from these data: {joined(untold)}. What would tell: {what}.")
-    notes += [wanted_terms(found.models), *remarks]
+    notes += [wanted_terms(found.models), *bound_of_delay(told), *remarks]
     if found.robot.drive == "current":
         notes.append(
             "Currents have no scale in newtons: this is stiffness over the motors' gain, and damping and inertia over "

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.identify.answer import recommendation_by_ratios
+from wristctl.commands.identify.answer import bound_of_delay, recommendation_by_ratios
 from wristctl.commands.identify.driven import DRAWN, TRIED, DrivenTold, driven_plan, identify_driven, keep_prediction
 from wristctl.commands.inputs import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
@@ -248,7 +248,8 @@ def told_answer(
     )
     used = sum(len(recording.time) for recording in fit.recordings)
     fewer = f" Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
-    notes: list[str | Table] = [wanted_terms(models) + fewer * (used < samples), *remarks]
+    first = wanted_terms(models) + fewer * (used < samples)
+    notes: list[str | Table] = [first, *bound_of_delay(fit.told), *remarks]
     untold = [name for name, one in fit.told.items() if not one.known]
     if what := "; ".join(motions_for(untold)):
         steps = " Quick steps: `wristctl hw-run identify --rig my_rig.py:RIG`." * ("quick steps" in what)
