@@ -222,7 +222,7 @@ def check_size(path: KeyPath, value: Any, where: Phrase) -> None:
     low, high = _SENSIBLE.get(".".join(map(str, path[-2:])), _SENSIBLE.get(name, (0.0, math.inf)))
     if value != 0.0 and not low <= abs(value) <= high:
         problem = f"{value:g} {unit} is not between {low:g} and {high:g}"
-        raise UserError(problem, where, (f"is that meant? give it in {unit}, or go on with ", _FORCE))
+        raise UserError(problem, where, ("is that meant? go on with ", _FORCE))
 
 
 def _with_items(study: Study, origins: Mapping[KeyPath, Phrase]) -> Iterator[tuple[KeyPath, Phrase]]:
