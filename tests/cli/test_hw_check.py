@@ -114,6 +114,17 @@ def test_check_for_programs_is_in_seconds(call: Call, asked: list[Any]) -> None:
     }  # fmt: skip
 
 
+def test_check_tells_what_a_try_of_the_wiring_came_to_and_units(call: Call, asked: list[Any]) -> None:
+    code, out, _ = call("hw", "check", "--wiring", "2", "--yes")
+    assert code == 0 and out.startswith("Wiring: the board has made 160 steps of axis 2") and ("moved", 2) in asked
+    lines = [line.split() for line in out.splitlines()]
+    for line in (["time", "0", "s"], ["watchdog_left", "0", "s"], ["max_rate", "1000", "steps/s"], ["lapses", "0"]):
+        assert line in lines
+    assert json.loads(call("hw", "check", "--wiring", "2", "--yes", "--json")[1])["wiring"]["axis"] == 2
+    code, out, _ = call("hw", "check")
+    assert code == 0 and "Wiring" not in out and "wiring" not in json.loads(call("hw", "check", "--json")[1])
+
+
 @pytest.mark.parametrize("wrong", [("--rounds", "0"), ("--wiring", "4"), ("--wiring", "-1")])
 def test_check_refuses_no_rounds_and_no_axis(call: Call, asked: list[Any], wrong: tuple[str, str]) -> None:
     assert call("hw", "check", *wrong)[0] == 2 and asked == []

@@ -442,6 +442,13 @@ def test_a_clock_that_goes_back_is_refused() -> None:
         guarded.now()
 
 
+def test_of_a_file_rigs_alone_are_proposed(tmp_path: Path) -> None:
+    with pytest.raises(UserError) as refused:
+        checked(written(tmp_path).replace(":RIG", ":NOPE"))
+    assert "has no NOPE" in refused.value.what and "RIG" in str(refused.value.fix)
+    assert not any(constant in str(refused.value.fix) for constant in ("RADIUS", "STEP", "DELAY", "TENDON"))
+
+
 def test_a_class_that_lacks_a_call_is_no_rig() -> None:
     class Half:
         facts = _facts()

@@ -43,6 +43,17 @@ def move_a_little(board: Board, axis: int) -> Status:
     return board.disable()
 
 
+def moved_a_little(axis: int) -> str:
+    """What the board has done in a `move_a_little` that raised nothing, and what remains to be looked at."""
+    return (
+        f"Wiring: the board has made {WIRING_STEPS} steps of axis {axis} forward and as many back, and released the "
+        "drives. It counts the steps that it makes, and not whether a motor follows: axis "
+        f"{axis} alone must have turned by a twentieth of a turn at 1/16 step, and back. One that hums or stands: the "
+        "drive's 5 V / 24 V selector and current switches, or two wires of different coils swapped; another axis that "
+        "turns: plugs that are exchanged."
+    )
+
+
 SYSTEM = Path("/sys/bus/usb-serial/devices")
 
 # Seconds between two hand-overs, by adapter: a 16U2's timer (arduino-usbserial: 256 x 256 cycles of 16 MHz), FTDI's

@@ -32,7 +32,7 @@ def emulate(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Serve the emulated board for any serial client, in real time; its port is the only line on stdout.
+    """Serve the emulated board for any serial client, in real time; its port is the first line on stdout.
 
     With --wrist a second line says where the camera's pictures are, which --camera takes, with planes=2 a third where
     the second's are; press, release (the emergency stop) and directions that the wrist is turned to can be typed.

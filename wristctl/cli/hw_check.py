@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,7 +51,7 @@ def check(
         named = {"camera": camera, "optics": optics, "optics_2": optics_2}
         chosen = {name: value for name, value in named.items() if value is not None}
         return check_rig(port, baud, chosen, override or [], axis, yes, as_json, quiet)
-    from wristctl.board.check import adapter_of, move_a_little, round_trips
+    from wristctl.board.check import WIRING_STEPS, adapter_of, move_a_little, moved_a_little, round_trips
     from wristctl.board.driver import Board
     from wristctl.board.messages import Command
     from wristctl.board.transport import EMULATED, open_transport
@@ -82,19 +83,36 @@ def check(
             "round_trips_s": timed,
             "counters": counted,
         }
+        if wiring is not None:
+            shown["wiring"] = {"axis": wiring, "steps": WIRING_STEPS}
         return print_json(shown)
+    if wiring is not None:
+        print(textwrap.fill(moved_a_little(wiring), 100), end="\n\n")
+    units = _units()
     columns = ("command", "times", "median [ms]", "p99 [ms]", "worst [ms]")
     rows = [(timing.command, timing.rounds, *(1e3 * value for value in timing[2:])) for timing in times]
     for table in (
         Table(
             "Board",
             ("port", transport.name),
-            [(name, str(value)) for name, value in {"USB adapter": adapter, **facts}.items()],
+            [
+                (name, f"{value} {units.get(name, '')}".rstrip())
+                for name, value in {"USB adapter": adapter, **facts}.items()
+            ],
         ),
         Table("Round trips", columns, rows),
         Table("On the wire", ("what", "count"), list(counted.items())),
     ):
         print(table.text(), end="\n\n")
+
+
+def _units() -> dict[str, str]:
+    """Units of what a board says of itself, by name; none of a number or a name."""
+    from wristctl.board.layout import LAYOUTS
+    from wristctl.board.messages import Hello, Status
+
+    fields = (field for message in (Hello, Status) for field in LAYOUTS[message].fields)
+    return {field.name: field.unit for field in fields if field.unit != "1" and field.kind is None}
 
 
 def _ask_before_moving(axis: int) -> None:

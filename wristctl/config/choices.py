@@ -28,10 +28,13 @@ class Choices(MutableMapping[str, T], Generic[T]):
     """
 
     def __init__(
-        self, what: str, entries: Mapping[str, str], group: str = "", made: Mapping[str, tuple[str, str]] | None = None
-    ) -> None:
+        self, what: str, entries: Mapping[str, str], group: str = "", made: Mapping[str, tuple[str, str]] | None = None,
+        calls: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         self.what, self.group, self.made = what, group, made or {}
         """Noun for an entry, the group of its entry points, and what a run makes first: what is missing, and how."""
+        self.calls = calls
+        """Calls that every entry has, by which a name of a file is proposed where another was meant."""
         self._entries: dict[str, Any] = dict(entries)
         self._origins: dict[str, Foreign] = {}
 
@@ -80,7 +83,8 @@ class Choices(MutableMapping[str, T], Generic[T]):
     def loaded(self, name: str) -> tuple[T, Foreign]:
         """The object of a file.py:NAME or of an entry point, and where it is from."""
         loader = import_module(_LOADER)
-        loaded: tuple[T, Foreign] = loader.load(name) if is_reference(name) else loader.entry_point(self.group, name)
+        found = loader.load(name, self.calls) if is_reference(name) else loader.entry_point(self.group, name)
+        loaded: tuple[T, Foreign] = found
         return loaded
 
     def _installed(self) -> Sequence[str]:
@@ -114,6 +118,7 @@ RIGS: Choices[Any] = Choices(
         "servos": "wristctl.servos.servo_bench:ServoBench",
     },
     "wristctl.rigs",
+    calls=("connect", "send", "look"),
 )
 
 # Table of `wristctl.records.recorded_table.LogFormat`: what other programs write, known by how it begins.

@@ -83,11 +83,11 @@ def _references(value: Any) -> Iterator[str]:
 _loaded: dict[Path, tuple[ModuleType, dict[Path, str]]] = {}
 
 
-def load(reference: str) -> tuple[Any, Foreign]:
+def load(reference: str, calls: Sequence[str] = ()) -> tuple[Any, Foreign]:
     """The object that a reference names, and where it is from. A source that was changed is read again.
 
     Raises UserError where there is no such file or name, where it cannot be imported, and where it lies in a run and
-    nobody has said that it may be loaded.
+    nobody has said that it may be loaded. In place of a name that is none those are proposed that have these calls.
     """
     path, attribute = split(reference)
     file = Path(os.path.abspath(path.expanduser()))
@@ -100,7 +100,11 @@ def load(reference: str) -> tuple[Any, Foreign]:
     if not hasattr(module, attribute):
         members = {name: member for name, member in vars(module).items() if not name.startswith("_")}
         own = {n: m for n, m in members.items() if not callable(m) or getattr(m, "__module__", "") == module.__name__}
-        names = [name for name, member in own.items() if not isinstance(member, ModuleType)]
+        names = [
+            name
+            for name, member in own.items()
+            if not isinstance(member, ModuleType) and all(callable(getattr(member, call, None)) for call in calls)
+        ]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
 
