@@ -217,7 +217,25 @@ def test_a_stop_is_told_with_the_last_second_by_tenths(
     cells = [row.split() for row in rows]
     times = [float(row[0]) for row in cells]
     assert times == pytest.approx(np.arange(0.095, 1.0, 0.1), abs=1e-9), "the last of each tenth"
-    assert cells[-1] == ["0.995", "4.31", "5.54", "-", "1.12", "2.12", "4.12", "5.12", "RUN"]
+    assert cells[-1] == ["0.995", "4.31", "5.54", "none", "1.12", "2.12", "4.12", "5.12", "RUN"]
+
+
+@pytest.mark.parametrize(("trials", "told"), [((0,), []), ((0, -1), ["0", "none"]), ((-1,), ["none"])])
+def test_the_last_second_has_what_was_seen_and_whose_its_times_are(trials: tuple[int, ...], told: list[str]) -> None:
+    """A picture comes every sixth tick; the return after a trial counts its time anew, and is of none."""
+    rows = [
+        {"trial": trial, "time": 0.01 * k, "theta": 0.0, "theta_ref": 0.0, "state": "RUN"}
+        | {"verdict": "ok" if k % 6 == 0 else "", "tension_1": 1.0}
+        for trial in trials
+        for k in range(100 // len(trials))
+    ]
+    table = hw_trials._last_second(SimpleNamespace(last=rows), False)  # type: ignore[arg-type]
+    assert [row[table.columns.index("marker")] for row in table.rows] == ["ok"] * 10
+    assert ("trial" in table.columns) is bool(told)
+    if told:
+        assert list(dict.fromkeys(str(row[0]) for row in table.rows)) == told
+    unseen = hw_trials._last_second(SimpleNamespace(last=[row | {"verdict": ""} for row in rows]), False)  # type: ignore[arg-type]
+    assert {row[unseen.columns.index("marker")] for row in unseen.rows} == {"none"}
 
 
 @pytest.mark.slow

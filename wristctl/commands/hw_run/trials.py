@@ -303,9 +303,14 @@ def _tell_oddities(session: Session, experiment: Experiment) -> None:
 
 
 def _last_second(trial_log: TrialLog, own: bool) -> Table:
-    """The last second of ticks, every tenth of it."""
+    """The last second of ticks, every tenth of it, with the trial where there is more than one or none.
+
+    What was seen is the newest of each tenth: few ticks have a picture of their own.
+    """
     rows = list(trial_log.last)
-    shown = rows[:: -max(1, len(rows) // 10)][::-1]
+    every = max(1, len(rows) // 10)
+    tenths = [rows[max(0, end - every) : end] for end in range(len(rows), 0, -every)][::-1]
+    shown = [tenth[-1] for tenth in tenths]
     angles = {"theta": "theta [deg]", "theta_ref": "reference [deg]"}
     seen = "look" if own else "marker"
     verdicts = {"verdict": seen}
@@ -314,15 +319,18 @@ def _last_second(trial_log: TrialLog, own: bool) -> Table:
         angles = {f"{name}_{plane}": f"{word}{plane} [deg]" for name, word in both.items() for plane in PLANES}
         verdicts = {f"verdict_{plane}": f"{plane} {seen}" for plane in PLANES}
     pulls = {name: f"T{name.removeprefix('tension_')} [N]" for name in shown[0] if name.startswith("tension_")}
-    columns = ("time [s]", *angles.values(), *verdicts.values(), *pulls.values(), "state")
+    trials = {row["trial"] for row in shown}
+    named = len(trials) > 1 or min(trials, default=0) < 0  # times begin anew with each
+    columns = (*["trial"] * named, "time [s]", *angles.values(), *verdicts.values(), *pulls.values(), "state")
     cells = [
         (
+            *[row["trial"] if row["trial"] >= 0 else "none"] * named,
             round(row["time"], 3),
             *(round(float(np.degrees(row[name])), 2) for name in angles),
-            *(str(row[name]) or "-" for name in verdicts),
+            *(next((str(one[name]) for one in tenth[::-1] if one[name]), "none") for name in verdicts),
             *(round(row[name], 2) for name in pulls),
             row["state"],
         )
-        for row in shown
+        for tenth, row in zip(tenths, shown, strict=True)
     ]
     return Table("The last second", columns, cells)
