@@ -16,11 +16,15 @@ import numpy as np
 import pytest
 
 from wristctl import load_study, tune
+from wristctl.commands import choice_tables
 from wristctl.commands.perform import perform, prepare
 from wristctl.commands.progress import counting, no_event
+from wristctl.commands.ranking_answer import condition_of_loop
 from wristctl.commands.session import Done, Event, Unattended
 from wristctl.commands.tune.answer import Beside, Start, answer_of, at_edge, beside_feedforward, starts_of
 from wristctl.commands.tune.command import TUNE, Tuned
+from wristctl.config.compare import CompareSettings
+from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
@@ -260,6 +264,21 @@ def test_the_loops_that_it_was_not_tuned_on_are_told_by_what_the_gains_do_there(
     assert "other loops" not in _text(_search("smc"), {})
     sound = _text(_search("smc"), {}, {"camera": {}, "exact": {}})
     assert "holds on camera and exact" in sound and "Do not use gains" not in sound
+    wrong = {name: {"failed": 1} for name in ("exact", "sampled", "four-segments")} | {"camera": {"limit cycle": 2}}
+    text = " ".join(_text(_search("smc"), {}, wrong).split())
+    assert "smc fails on exact, sampled and four-segments, swings on camera." in text and text.count("fails on") == 1
+
+
+def test_loops_are_told_with_the_condition_that_compare_ranks_them_under() -> None:
+    loops, wrist = TuneSettings().loops | CompareSettings().loops, WristParameters()
+    conditions = {name: condition_of_loop(loop, wrist) for name, loop in loops.items()}
+    named = {row[0] for row in choice_tables.conditions().rows}
+    assert set(conditions.values()) <= named and conditions["exact"] == "ideal" and conditions["sampled"] == "sampled"
+    assert conditions["camera"] == "motors + camera"
+    search = _search("smc")
+    marks: dict[str, dict[str, dict[str, int]]] = {"smc": {"sampled": {}, "exact": {}}}
+    told = answer_of({"smc": search}, {"smc": Beside(1e-3, 2e-2, 8)}, {"smc": {}}, 8, "", marks, conditions=conditions)
+    assert told is not None and "smc holds on sampled and exact (ideal)" in " ".join(" ".join(told.lines()).split())
 
 
 def test_the_margin_is_told_with_its_loop_and_what_is_less_than_it_should_be_is_named(tuned: Tuned) -> None:

@@ -10,8 +10,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from wristctl.commands.printed_table import degrees, joined, two
-from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits, labels_of
+from wristctl.comparison.combinations import class_of
+from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits, labels_of, traits_of
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.tuning.objective import YARDSTICK
 
@@ -40,6 +43,11 @@ def class_words(name: str, traits: Traits) -> str:
         return _rig(traits, " + ")
     words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
     return f"{_rig(traits, ' + ')} + {words}" if traits.rig else words
+
+
+def condition_of_loop(loop: Loop, wrist: WristParameters) -> str:
+    """The condition that `compare` ranks a loop under, in the words of its tables."""
+    return class_words(class_of(loop, wrist), traits_of([loop], wrist))
 
 
 def _rig(traits: Traits, between: str = " and ") -> str:

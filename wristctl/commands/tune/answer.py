@@ -128,13 +128,14 @@ def answer_of(
     stood: Mapping[str, Stood] | None = None,
     bending: str = "",
     starts: Mapping[str, Start] | None = None,
+    conditions: Mapping[str, str] | None = None,
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
     `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on,
     and `stood` how much they stand on its loop, by controller. `bending` says in which planes all loops bend, where
     these are two, and `starts` what the best preset of each controller is worth, of those for which a search found
-    better gains.
+    better gains; `conditions` are what `compare` calls the condition of each loop.
     """
     if not searches:
         return None
@@ -152,7 +153,7 @@ def answer_of(
     notes = [bending] * bool(bending)
     notes.append(" ".join([_edges(ordered, searches), *_presets(others, searches), _lost(ordered, lost, cases)]))
     notes += _margins(ordered, stood or {}, little, motion.where if motion else "the loop")
-    notes += _elsewhere(ordered, elsewhere)
+    notes += _elsewhere(ordered, elsewhere, conditions or {})
     more = "All tables: `.tables`."
     if run and motion is not None:
         notes += _next(f"{run}/{file_of(best)}", motion)
@@ -356,14 +357,19 @@ def _margins(ordered: Sequence[str], stood: Mapping[str, Stood], little: Sequenc
     return [words + f" Less than {least}: {joined(little)}." * bool(little)]
 
 
-def _elsewhere(ordered: Sequence[str], elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]]) -> list[str]:
-    """Loops beyond those of the search on which gains hold, and what they do on the others."""
+def _elsewhere(
+    ordered: Sequence[str],
+    elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
+    conditions: Mapping[str, str],
+) -> list[str]:
+    """Loops beyond those of the search on which gains hold, and what they do on the others; with their `conditions`."""
     facts = []
     for name in ordered:
-        marks = elsewhere.get(name, {})
-        holds = [loop for loop, wrong in marks.items() if not wrong]
-        words = [f"holds on {joined(holds)}"] * bool(holds)
-        words += [f"{' and '.join(_VERBS[mark] for mark in wrong)} on {loop}" for loop, wrong in marks.items() if wrong]
+        does: dict[str, list[str]] = {"holds": []}
+        for loop, wrong in elsewhere.get(name, {}).items():
+            verbs, there = " and ".join(_VERBS[mark] for mark in wrong), conditions.get(loop, loop)
+            does.setdefault(verbs or "holds", []).append(loop if there == loop else f"{loop} ({there})")
+        words = [f"{verbs} on {joined(loops)}" for verbs, loops in does.items() if loops]
         facts += [f"{name} {', '.join(words)}"] * bool(words)
     unsound = any(wrong for marks in elsewhere.values() for wrong in marks.values())
     warned = " Do not use gains on a loop where they swing or fail." * unsound

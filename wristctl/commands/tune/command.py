@@ -70,12 +70,15 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
+        from wristctl.commands.ranking_answer import condition_of_loop
         from wristctl.commands.tune.answer import answer_of
         from wristctl.commands.tune.searches import motion_of
 
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
-        return answer_of(*found, motion, self.stood, self.bending, self.starts)
+        loops = self.study.tune.loops.items()
+        conditions = {name: condition_of_loop(loop, self.study.wrist) for name, loop in loops}
+        return answer_of(*found, motion, self.stood, self.bending, self.starts, conditions)
 
     @property
     def marks(self) -> list[str]:
