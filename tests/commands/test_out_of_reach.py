@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -42,6 +43,26 @@ def tuned(*settings: str) -> list[OutOfReach]:
 def compared(*settings: str) -> list[OutOfReach]:
     study = study_of(*settings)
     return out_of_reach(study.wrist, asked_by(study, study.compare))
+
+
+@pytest.mark.parametrize("kind", ["circumduction", "diagonal"])
+@pytest.mark.parametrize("limit", [6, 12])
+def test_in_two_planes_it_is_said_how_much_of_what_is_asked_is_held(kind: str, limit: int) -> None:
+    """Whatever the course of the motion: that much is held, and a little more is not."""
+    usual = (f"wrist.tension_limit={limit}", "wrist.stiffness=1.5", f"simulate.reference.kind={kind}")
+    (found,) = simulated(*usual)
+    match = re.search(rf"tensions of {limit} N hold at most (\S+) of the 30 deg asked", found.what)
+    assert match and 0.5 < float(match[1]) < 15.0
+    assert not simulated(*usual, f"simulate.reference.angle_deg={match[1]}")
+    assert simulated(*usual, f"simulate.reference.angle_deg={1.05 * float(match[1])}")
+
+
+def test_a_wrist_that_is_far_too_stiff_is_held_hardly_at_all_and_one_that_hangs_not_even_straight() -> None:
+    (found,) = simulated("wrist.stiffness=200", "simulate.reference.kind=circumduction")
+    assert re.search(r"60 N hold at most 0\.\d+ of the 30 deg asked", found.what)
+    heavy = ("wrist.tension_limit=6", "wrist.hand_mass=40", "wrist.gravity_flexion=9.81")
+    (found,) = simulated(*heavy, "simulate.reference.kind=circumduction")
+    assert "not hold even the straight wrist" in found.what
 
 
 @pytest.mark.parametrize("direction", ["ulnar", "radial", "flexion", "extension"])

@@ -15,7 +15,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.study_files.load import load_study
-from wristctl.wrist.spatial.held_bends import first_beyond, held_all_around
+from wristctl.wrist.spatial.held_bends import held_all_around, share_held
 from wristctl.wrist.tendon_layout import TendonLayout
 
 
@@ -83,7 +83,7 @@ def test_in_two_planes_the_reach_is_the_angle_that_is_held_toward_every_side(ten
     held = held_all_around(weak, layout, force, 45.0)
     around = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     sides = np.stack([np.cos(around), np.sin(around)], axis=-1)
-    beyond = [first_beyond(weak, layout, np.radians(angle) * sides) is not None for angle in (held - 0.5, held + 1.5)]
+    beyond = [share_held(weak, layout, np.radians(angle) * sides) < 1.0 for angle in (held - 0.5, held + 1.5)]
     assert 5.0 < held < 44.0 and not beyond[0]
     if not force:
         assert beyond[1]
@@ -99,8 +99,8 @@ def test_three_tendons_reach_as_far_as_two_of_them_hold_across_the_third(tension
     wrist = WristParameters.model_validate({"tendons": places, "tension_limit": tension_limit})
     layout, angles, across = TendonLayout.of(wrist), np.arange(0.0, 46.0), math.radians(first + 90.0)
     bends = np.radians(angles)[:, None] * np.array([math.cos(across), math.sin(across)])
-    beyond = first_beyond(wrist, layout, bends)
-    assert beyond is not None and held_all_around(wrist, layout, 0.0, 45.0) == angles[beyond - 1]
+    share = share_held(wrist, layout, bends)
+    assert share < 1.0 and held_all_around(wrist, layout, 0.0, 45.0) == math.floor(45.0 * share)
 
 
 def test_a_recommendation_for_three_tendons_is_planned_in_two_planes_toward_every_side() -> None:

@@ -286,8 +286,9 @@ def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | N
     """The bend that the tendons do not hold, and what helps, in words; tensions without limits hold every bend."""
     from wristctl.simulation.planes import Asked, motion_in, planes_of
     from wristctl.simulation.reference import by_angles, motion
+    from wristctl.simulation.trajectory import size_of
     from wristctl.simulation.worlds import loop_facing, plant_of
-    from wristctl.wrist.spatial.held_bends import first_beyond
+    from wristctl.wrist.spatial.held_bends import share_held
     from wristctl.wrist.statics import shortfall
     from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -296,13 +297,16 @@ def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | N
     reference, period = by_angles(asked.reference), sample_period(asked.loop.control_period)
     if planes_of(wrist, [Asked(asked.loop, asked.reference, asked.direction)]) == 2:
         bends = motion_in(2, reference, asked.direction, wrist, asked.horizon, period).bend_ref
-        beyond = first_beyond(plant_of(wrist, asked.loop.plant), TendonLayout.of(wrist), bends)
-        if beyond is None:
+        share = share_held(plant_of(wrist, asked.loop.plant), TendonLayout.of(wrist), bends)
+        if share == 1.0:
             return None
-        ulnar, flexion = (math.degrees(bend) for bend in bends[beyond])
-        where = f"{ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward flexion"
+        largest = math.degrees(float(size_of(bends).max()))
+        held = "do not hold even the straight wrist"
+        if share == share:
+            most = _rounded(share * largest, math.floor) if share > 0.0 else 0.0
+            held = f"hold at most {most:.3g} of the {largest:.3g} deg asked"
         fix = "a larger tension_limit or tendon_radius, or a smaller angle_deg would do"
-        return f"tensions of {wrist.tension_limit:g} N do not hold {where}", fix
+        return f"tensions of {wrist.tension_limit:g} N {held}", fix
     facing, loop = loop_facing(wrist, asked.loop, asked.direction)
     theta = motion(reference, facing, asked.horizon, period).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))

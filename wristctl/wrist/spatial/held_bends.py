@@ -54,8 +54,24 @@ def _holds(wrist: WristParameters, layout: TendonLayout, bends: Array, load: Arr
     return ~saturated
 
 
-def first_beyond(wrist: WristParameters, layout: TendonLayout, bends: Array) -> int | None:
-    """The first of bends (T, 2) [rad] that tendons within their limits do not hold at rest; None without one."""
-    few = np.linspace(0, len(bends) - 1, min(len(bends), 400)).astype(np.int64)
-    beyond = np.flatnonzero(~_holds(wrist, layout, bends[few]))
-    return int(few[beyond[0]]) if len(beyond) else None
+def share_held(wrist: WristParameters, layout: TendonLayout, bends: Array) -> float:
+    """The share of bends (T, 2) [rad] to which tendons within their limits hold them at rest: 1 where they hold all.
+
+    Smaller motions of the same shape are held; nan where not even the straight wrist is.
+    """
+    few = bends[np.linspace(0, len(bends) - 1, min(len(bends), 400)).astype(np.int64)]
+
+    def held(share: float) -> bool:
+        return bool(_holds(wrist, layout, share * few).all())
+
+    if held(1.0):
+        return 1.0
+    shares = np.linspace(0.0, 1.0, 17)
+    beyond = next(k for k, share in enumerate(shares) if not held(share))
+    if beyond == 0:
+        return math.nan
+    low, high = shares[beyond - 1], shares[beyond]
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held(middle) else (low, middle)
+    return float(low)
