@@ -103,6 +103,21 @@ def test_compiled_c_and_numpy_answer_as_the_recorded_loop(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("reference.kind=circumduction", "loop.actuator.level=tendon"),
+        ("loop.actuator.level=servo", "loop.sensor.level=camera"),
+        CAMERA,
+    ],
+)
+def test_the_page_says_of_every_constant_what_it_is(overrides: tuple[str, ...], tmp_path: Path) -> None:
+    export_law(["pid-ff"], [*overrides, "horizon=0.1"], tmp_path / "law", tmp_path)
+    rows = re.findall(r"^\| `([A-Z]\w+)` \| (\S+) \| (.*) \|$", (tmp_path / "law" / "README.md").read_text(), re.M)
+    assert len(rows) > 15 and not [name for name, _, meaning in rows if not meaning.strip()]
+
+
+@pytest.mark.slow
 def test_a_law_of_ones_own_is_written_and_its_gains_are_constants(tmp_path: Path) -> None:
     own = tmp_path / "my_own.py"
     own.write_text(OWN_LAW)

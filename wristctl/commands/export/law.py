@@ -41,6 +41,9 @@ _MEANINGS = {
     "MOTOR_LAG": "time constant of the motors [s]", "MOTOR_STIFFNESS": "stiffness of one tendon [N/m]",
     "MOTOR_STEP": "length of a microstep [m]", "MOTOR_SPEED": "largest speed of a spool [m/s]",
     "MOTOR_ACCELERATION": "largest acceleration of a spool by its host [m/s^2]",
+    "BOARD_LAG": "time constant of the motors that their host reckons with [s]",
+    "BOARD_STEP": "resolution of targets that it reckons with [m]",
+    "BOARD_SPEED": "largest speed of a spool that it reckons with [m/s]",
     "_RAMP": "change of a spool's rate by its board [m/s^2]", "_DELAY": "from a tick until its rate takes effect [s]",
     "_UPDATE": "between two changes of a rate by the board [s]",
     "_HAND_MASS": "mass of the hand [kg]", "_MASS": "moving mass of the wrist [kg]",
@@ -51,6 +54,8 @@ _MEANINGS = {
     "_STIFFNESS": "bending stiffness [N m/rad]", "_DAMPING": "bending damping [N m s/rad]",
     "SPACE_STIFFNESS": "bending stiffness, a symmetric matrix [N m/rad]",
     "SPACE_DAMPING": "bending damping, a symmetric matrix [N m s/rad]",
+    "_FORCE_X": "force on the tip along the straight wrist [N]", "_FORCE_Y": "force on the tip toward ulnar [N]",
+    "_FORCE_Z": "force on the tip toward flexion [N]",
 }  # fmt: skip
 
 
