@@ -20,6 +20,7 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.identification.rig_trend import FALSE_ALARM, FEWEST, Reading, Trend, trends_of
 from wristctl.records import start_run
+from wristctl.records.find import list_runs
 from wristctl.study_files.load import load_study
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 
@@ -98,9 +99,15 @@ def test_a_rig_that_only_scatters_drifts_nowhere_and_one_run_or_two_rigs_are_ref
     assert code == 0 and out.startswith("Nothing drifts: 9 quantities of 5 runs")
     code, out, err = call("runs", "trend", "latest:hw-run")
     assert code == 2 and out == "" and f"takes {FEWEST}" in err and "name more runs" in err
-    make([0.43], [970.0], load_study((), ["hw-run.actuator.pulley_radius=0.01"]))
+    own = [run.id for run in list_runs(Path("results"))]
+    make([0.43] * 2, [970.0] * 2, load_study((), ["hw-run.actuator.pulley_radius=0.01", "wrist.stiffness=0.7"]))
+    others = [run.id for run in list_runs(Path("results")) if run.id not in own]
     code, _, err = call("runs", "trend")
-    assert code == 2 and "its actuator is not that of" in err and "runs of one rig" in err
+    said = " ".join(err.split())
+    assert code == 2 and "of 2 rigs" in said and f"{', '.join(own[:3])} and 2 more" in said
+    assert "wrist.stiffness 0.7, actuator.pulley_radius 0.01: " + ", ".join(others) in said
+    assert f"wristctl runs trend {' '.join(own)}" in said
+    assert call("runs", "trend", *own)[0] == 0
 
 
 def readings_of(values: np.ndarray, days: np.ndarray) -> list[Reading]:

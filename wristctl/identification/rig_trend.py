@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel
 from scipy import stats
 
 from wristctl.arrays import Array
@@ -179,14 +180,41 @@ def _rest(ticks: pd.DataFrame) -> pd.DataFrame | None:
 
 
 def check_one_rig(runs: Sequence[Run]) -> None:
-    """Raise UserError where runs are not of one rig, by the settings that readings depend on."""
-    rigs = [(run, rig) for run in runs if (rig := _rig(run)) is not None]
-    for run, rig in rigs[1:]:
-        for name, value in rig.items():
-            first, believed = rigs[0]
-            if value != believed[name]:
-                problem = f"its {name} is not that of {first.id}"
-                raise UserError(problem, run.id, "name runs of one rig, with the same wrist, actuator and markers")
+    """Raise UserError where runs are not of one rig, by the settings that readings depend on: which are of which."""
+    rigs: list[tuple[dict[str, object], list[str]]] = []
+    for run in runs:
+        if (rig := _rig(run)) is not None:
+            alike = next((names for known, names in rigs if known == rig), None)
+            if alike is None:
+                rigs.append((rig, [run.id]))
+            else:
+                alike.append(run.id)
+    if len(rigs) < 2:
+        return
+    leaves = [_leaves(rig) for rig, _ in rigs]
+    differ = [name for name in leaves[0] if any(one.get(name) != leaves[0][name] for one in leaves[1:])]
+    listed = []
+    for one, (_, names) in zip(leaves, rigs, strict=True):
+        told = [f"{name} {one.get(name)}" for name in differ[:_TOLD]] + ["..."] * (len(differ) > _TOLD)
+        more = f" and {len(names) - _TOLD} more" * (len(names) > _TOLD)
+        listed.append(f"of {', '.join(told)}: {', '.join(names[:_TOLD])}{more}")
+    most = max((names for _, names in rigs), key=len)
+    fix = f"name the runs of one rig, for example: wristctl runs trend {' '.join(most)}"
+    raise UserError(f"these runs are of {len(rigs)} rigs", "; ".join(listed), fix)
+
+
+# Settings that differ between rigs, and runs of each rig, that an error names.
+_TOLD = 3
+
+
+def _leaves(rig: Mapping[str, object]) -> dict[str, object]:
+    """What a rig is by dotted key; a list is one value."""
+    values = {name: part.model_dump() if isinstance(part, BaseModel) else part for name, part in rig.items()}
+    found: dict[str, object] = {}
+    for name, value in values.items():
+        inner = {f"{name}.{key}": each for key, each in value.items()} if isinstance(value, dict) else {name: value}
+        found |= _leaves(inner) if isinstance(value, dict) else inner
+    return found
 
 
 def _rig(run: Run) -> dict[str, object] | None:
