@@ -58,8 +58,8 @@ def test_earlier_runs_are_listed_oldest_first_as_having_ended_well(call: Call, e
 
 
 def test_earlier_runs_are_as_they_were_sealed(call: Call, earlier: Path) -> None:
-    said = call("runs", "verify", "--out", str(earlier)).splitlines()
-    assert said == [f"{run.id}  as sealed" for run in list_runs(earlier)]
+    said, ids = call("runs", "verify", "--out", str(earlier)).splitlines(), [run.id for run in list_runs(earlier)]
+    assert said == [f"{each:{max(map(len, ids))}}  as sealed" for each in ids]
 
 
 def test_an_earlier_run_is_shown_with_its_metrics_and_files(call: Call, run: Run) -> None:
