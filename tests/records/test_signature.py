@@ -103,7 +103,8 @@ def test_the_commands_say_so(make: Make, keys: dict[str, Path], call: Call) -> N
     code, said = call("verify", signed.id, "--signers", str(keys["signers"]))
     assert code == 0 and "as sealed, signed by ada@example.org with SHA256:" in said
     code, said = call("verify", "--signed")
-    assert code == 3 and f"{bare.id}  as sealed, but nobody vouches for it\n  SHA256SUMS.sig: run is not signed" in said
+    name = f"{bare.id:{max(len(signed.id), len(bare.id))}}"
+    assert code == 3 and f"{name}  as sealed, but nobody vouches for it\n  SHA256SUMS.sig: run is not signed" in said
     assert call("verify")[0] == 0
     assert call("verify", "--signers", "absent")[0] == 2
 
