@@ -27,7 +27,7 @@ NAMED = r"30 deg .* 2\.99 N m where 60 N give 1\.68"
 
 
 def study_of(*settings: str) -> Study:
-    return wristctl.load_study(None, *OWN, *settings)
+    return wristctl.load_study(None, *OWN, *settings, force=True)
 
 
 def simulated(*settings: str) -> list[OutOfReach]:

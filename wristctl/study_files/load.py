@@ -136,8 +136,9 @@ def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phras
     """Advice where there is no such study file: how controllers are given, where it has the name of one."""
     keys = section_keys(command)
     if file not in CONTROLLERS or not keys.keys() & {"controller", "controllers"}:
-        beside = {name.removesuffix(".yaml"): name for name in studies_beside(Path(file))}
-        own = beside.get(nearest(file.removesuffix(".yaml"), beside) or "")
+        ending = ".yaml" * file.endswith(".yaml")  # which is no likeness of two files
+        beside = {name.removesuffix(ending): name for name in studies_beside(Path(file))}
+        own = beside.get(nearest(file.removesuffix(ending), beside) or "")
         return f"did you mean {own!r}?" if own else meant(shipped_name(Path(file)), shipped_names())
     if "controller" in keys:
         return (f"{file} is a controller: ", _as_controller(file, command))
