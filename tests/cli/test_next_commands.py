@@ -367,7 +367,7 @@ def test_a_file_of_three_tendons_goes_through_every_command_and_what_each_advise
     for words in following:
         assert wrist_of(did(*words, *TRIAL)[1]) == wrist
     said, _, _ = walked("analyse", robot, "--controller", "ct-dob", "--set", "angles_deg=[0, 15]")
-    assert "ct-dob/hardware in two planes toward ulnar is stable at 0 and 15 deg" in said
+    assert "ct-dob/default in two planes toward ulnar is stable at 0 and 15 deg" in said
     said, drawn, (train,) = walked("gen-data", robot, "--samples", "300")
     said, trained, (simulate,) = walked(*train, "--epochs", "40", "--set", "hidden=[8]", "--preset", "recommended")
     assert [one.run for one in trained.manifest.inputs] == [drawn.id] and "over both planes" in said

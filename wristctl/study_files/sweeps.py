@@ -69,9 +69,15 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
 
 
 def check_all_sizes(study: Study, origins: Mapping[KeyPath, Phrase], command: str) -> None:
-    """UserError, as of check_sizes, for what was given, and for the values of a sweep that the command makes."""
+    """UserError, as of check_sizes, for what was given, and for the values of a sweep that the command makes.
+
+    Controllers of one's own, which may not be loaded yet, have no size.
+    """
     check_sizes(study, origins)
-    for axis in axes_of(study, command) if "sweep" in sections_read(command) and ("sweep",) in origins else ():
+    values = {text: text.partition("=")[2].split(",") for text in study.sweep}
+    sized = [text for text, each in values.items() if not any(is_reference(value.strip()) for value in each)]
+    swept = study.model_copy(update={"sweep": tuple(sized)})
+    for axis in axes_of(swept, command) if "sweep" in sections_read(command) and ("sweep",) in origins else ():
         sizes = [value for value in axis.values if isinstance(value, float | int) and value != 0.0]
         for value in (min(sizes, key=abs), max(sizes, key=abs)) if sizes else ():
             check_size(axis.path, value, axis.where)
