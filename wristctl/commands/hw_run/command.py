@@ -182,9 +182,8 @@ def _with_planes(study: Study) -> Study:
 
     What a board cannot wind, or not so, is refused later, with what takes its tendons.
     """
-    if study.hw_run.rig is not None or not (
-        study.wrist.tendons in ("four", "five") or wound_in_both_planes(study.wrist)
-    ):
+    wound = study.wrist.tendons in ("four", "five") or wound_in_both_planes(study.wrist)
+    if study.hw_run.rig is not None or not wound:
         return study
     try:
         return with_planes(study)

@@ -257,11 +257,8 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
         asked: dict[str, Any] = {"tuned": None, "from_identified": None}
         if by_gain or (study.simulate.gains == "tuned" and not _of_several(axes_of(swept, command))):
             law = controller(study.simulate.controller)
-            asked |= {
-                "gains": dict(
-                    zip(law.gains, gains_of(law, study.simulate.gains, tuned, study.simulate.loop), strict=True)
-                )
-            }
+            values = gains_of(law, study.simulate.gains, tuned, study.simulate.loop)
+            asked["gains"] = dict(zip(law.gains, values, strict=True))
         study = study.model_copy(update={"simulate": study.simulate.model_copy(update=asked)})
     if command == "compare" and tuned:
         rows = tuple(
@@ -329,14 +326,8 @@ def _swept(session: Session, command: str) -> Swept:
         for key in keys:
             others = [other for other in keys if other is not key]
             findings.figure(f"sweep-{key.name}", over_setting, table, key, others, shown)
-    screen = answer(
-        command,
-        table,
-        keys,
-        shown,
-        str(findings.run.path) if findings.run else "",
-        _presets(base, command, axes, points),
-    )
+    place, presets = str(findings.run.path) if findings.run else "", _presets(base, command, axes, points)
+    screen = answer(command, table, keys, shown, place, presets)
     return Swept(study, findings, [rows_of(table.head(_PRINTED), keys, shown)], table, outcome.poisoned, screen)
 
 

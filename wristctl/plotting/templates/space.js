@@ -59,11 +59,16 @@
   const wide = 1.1 * (Math.max(...held.map(([, y, z]) => Math.hypot(y, z))) + 0.7 * Math.max(hand, rim));
   let azimuth = 0, elevation = 0;
 
-  // To the right, up, away, and by how much larger what is near is drawn.
+  // A direction as it is looked at: to the right, down, away.
+  function looked([x, y, z]) {
+    const behind = z * Math.cos(azimuth) - y * Math.sin(azimuth);
+    const right = y * Math.cos(azimuth) + z * Math.sin(azimuth), down = -(x * Math.cos(elevation) + behind * Math.sin(elevation));
+    return [right, down, behind * Math.cos(elevation) - x * Math.sin(elevation)];
+  }
+  // To the right, down, away, and by how much larger what is near is drawn.
   function seen([x, y, z]) {
-    const behind = z * Math.cos(azimuth) - y * Math.sin(azimuth), up = x - middle;
-    const away = behind * Math.cos(elevation) - up * Math.sin(elevation), near = far / (far + away);
-    return [near * (y * Math.cos(azimuth) + z * Math.sin(azimuth)), -near * (up * Math.cos(elevation) + behind * Math.sin(elevation)), away, near];
+    const [right, down, away] = looked([x - middle, y, z]), near = far / (far + away);
+    return [near * right, near * down, away, near];
   }
   const line = points => "M" + points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L");
   const around = Array.from({ length: 40 }, (_, k) => [Math.cos(k * Math.PI / 20), Math.sin(k * Math.PI / 20)]);
@@ -116,10 +121,8 @@
 
   // In a corner, as it is looked at; where it points at the reader or away its head alone.
   function ofGravity() {
-    const [x, y, z] = pulled, long = 0.16 * high, size = 0.045 * high;
-    const behind = z * Math.cos(azimuth) - y * Math.sin(azimuth);
-    const to = [y * Math.cos(azimuth) + z * Math.sin(azimuth), -(x * Math.cos(elevation) + behind * Math.sin(elevation))];
-    const [right, down] = to, shown = Math.hypot(right, down) || 1, cx = -0.86 * wide, cy = 0.72 * high;
+    const [right, down] = looked(pulled), shown = Math.hypot(right, down) || 1, long = 0.16 * high, size = 0.045 * high;
+    const cx = -0.86 * wide, cy = 0.72 * high;
     const end = [cx + long / 2 * right, cy + long / 2 * down], ahead = [right / shown, down / shown];
     const wing = side => [end[0] - size * (ahead[0] - side * ahead[1]), end[1] - size * (ahead[1] + side * ahead[0])];
     return line([[cx - long / 2 * right, cy - long / 2 * down], end]) + line([wing(0.6), end, wing(-0.6)]);
