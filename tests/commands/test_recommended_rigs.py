@@ -66,6 +66,13 @@ def test_a_trial_that_is_stopped_keeps_nothing_but_the_width_of_its_range() -> N
     )
 
 
+def test_the_page_says_on_which_side_of_the_printed_range_errors_are() -> None:
+    outside = {"0.7": CALM | {"rmse": 0.04}, "1": CALM | {"rmse": 0.15}}
+    assert "Of the 2 errors 0 are below the printed range, 0 above." in page([(0, KEPT)])
+    rows = [(0, KEPT | {"rigs": outside}), (4, KEPT | {"rigs": outside | {"1": {"stopped": "rate"}}})]
+    assert "Of the 3 errors 2 are below the printed range, 1 above." in page(rows)
+
+
 def test_the_other_finalists_are_run_by_the_printed_command_with_the_file_of_their_gains() -> None:
     candidates = [
         SimpleNamespace(file="data/controllers/a-tuned.yaml"),
