@@ -161,6 +161,9 @@ def test_typed_controllers_are_tuned_only_where_that_is_asked_for(folder: Path) 
     assert rows_of(tuned) == [("pid-ff", "tuned"), ("smc", "printed"), ("feedforward", "by-loop")]
     assert tuned.tuning.controllers == ("pid-ff",)
     assert settings_of("compare", "pid-ff", "controllers", tune=True).tuning.iterations == 15
+    assert settings_of("compare", "pid-ff", tune=True, override="tuning.candidates=8").tuning.candidates == 8
+    with pytest.raises(UserError, match="give a controller by its name alone"):
+        settings_of("compare", "pid-ff/hardware", tune=True, override="tuning.candidates=8")
 
 
 @pytest.mark.parametrize(
@@ -172,6 +175,8 @@ def test_typed_controllers_are_tuned_only_where_that_is_asked_for(folder: Path) 
         ("study", ("adrc/hardware",), "", "study searches the gains"),
         ("hw-run", ("pid-ff",), "controller=adrc", "leave out --controller"),
         ("hw-run", ("pid-ff/hardware",), "gains=default", "leave out --gains"),
+        ("compare", ("pid-ff", "adrc"), "tuning.candidates=8", "tuning.candidates=8 - fix: add --tune"),
+        ("compare", ("pid-ff", "adrc"), "compare.tuning.iterations=2", "add --tune"),
     ],
 )
 def test_what_cannot_be_typed_is_refused_by_the_word(

@@ -184,6 +184,9 @@ def _settle_tuning(
     names = [placed(row["controller"], None) for row in rows if row["gains"] == "tuned"]
     search = section.get("tuning")
     if not names or not (tune or isinstance(search, dict)):
+        if told := [given for key, given in origins.items() if key[:2] == place and isinstance(given, Setting)]:
+            fix = "give a controller by its name alone" if tune else "add --tune"
+            raise UserError("no gains are searched here, of which this is a setting", told[0].text, fix)
         section.pop("tuning", None)
         forget(origins, place)
         return
