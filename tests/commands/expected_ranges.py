@@ -21,9 +21,8 @@ import numpy as np
 from tests.commands.recommended_rigs import SPRINGS, drawn
 from tests.drawn_rigs import COMMITTED, ended, options, tried
 from wristctl.commands.inputs_of_loops import why_two_planes
-from wristctl.commands.recommend.command import SCALED
 from wristctl.commands.recommend.expected import FACTS as FACTS_OF_RIGS
-from wristctl.commands.recommend.expected import IDENTIFIED, Candidate, asked_for, known_of, rigs_asked, spread
+from wristctl.commands.recommend.expected import IDENTIFIED, SCALED, Candidate, asked_for, known_of, rigs_asked, spread
 from wristctl.commands.recommend.own_rig import on_the_rig
 from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs, reach_deg
 from wristctl.commands.recommend.rehearsals import _asked, _quietly, motions_of_trial

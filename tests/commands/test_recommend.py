@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 import wristctl
 from tests.commands.small_recommendation import RIG, study_of
 from wristctl.commands.kept_studies import gains_content, hw_run_fits, row_of, study_text
-from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Recommended
+from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Recommended, _not_tuned
 from wristctl.commands.recommend.command import _limit
-from wristctl.commands.recommend.expected import FAMILY, TOLERATED, Candidate, spread
+from wristctl.commands.recommend.expected import FAMILY, SCALED, TOLERATED, TUNED, Candidate, spread
 from wristctl.commands.recommend.figures import errors
 from wristctl.commands.recommend.rehearsals import Rehearsal
 from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of
@@ -163,6 +163,14 @@ def test_a_search_that_ends_where_it_began_is_no_row_of_its_own(found: Recommend
     for name in {one.controller for one in found.candidates}:
         gains = [list(one.gains.values()) for one in found.candidates if one.controller == name]
         assert not any(np.allclose(one, other, rtol=1e-6) for one, other in pairwise(gains))
+    feedforward = found.candidates[-1]
+    untuned = replace(found, candidates=[Candidate("pid-ff", SCALED, {"Kp": 1.0}), feedforward])
+    preset = Candidate("ct-dob", SCALED, {"Kp": 1.0})
+    both = [preset, preset._replace(origin=TUNED), *untuned.candidates]
+    for candidates, names in ((untuned.candidates, "pid-ff and ct-dob"), (both, "pid-ff")):
+        said = _not_tuned(replace(untuned, candidates=candidates))
+        assert "(1 x 4 candidates)" in said and said.endswith(f" for {names}.")
+    assert not _not_tuned(replace(untuned, candidates=[one._replace(origin=TUNED) for one in both]))
 
 
 def test_limits_are_those_of_the_gains_by_their_names() -> None:

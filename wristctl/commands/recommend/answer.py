@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.recommend.expected import ENOUGH, Candidate, Expected, share_of, spread
+from wristctl.commands.recommend.expected import ENOUGH, TUNED, Candidate, Expected, share_of, spread
 from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
@@ -259,7 +259,7 @@ def _notes(result: Recommended) -> list[str]:
     if result.reach_identified is not None and result.reach_identified > result.reach_deg:
         hold += f", {result.reach_identified:g} deg once tendons and springs are known (wristctl identify)"
     hold += "."
-    notes += [" ".join(filter(None, (hold, decided([result.ranking]))))]
+    notes += [" ".join(filter(None, (hold, decided([result.ranking]), _not_tuned(result))))]
     rehearsed = _rehearsed(result) if result.rehearsals else ""
     if result.best is None:
         return notes + [rehearsed] * bool(rehearsed)
@@ -276,6 +276,19 @@ def _notes(result: Recommended) -> list[str]:
         )
         how = f"emulated (on a real rig also --port /dev/ttyACM0 --camera 0 {cameras})"
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
+
+
+def _not_tuned(result: Recommended) -> str:
+    """Of which controllers the search found no gains but the preset's, which are a row of their own."""
+    tuned = {one.controller for one in result.candidates if one.origin == TUNED}
+    same = [name for name in result.searches if name not in tuned]
+    if not same:
+        return ""
+    settings = result.study.recommend
+    return (
+        f"The search ({settings.iterations} x {settings.candidates} candidates) found nothing better than the scaled "
+        f"preset for {joined(same)}."
+    )
 
 
 def _rehearsed(result: Recommended) -> str:

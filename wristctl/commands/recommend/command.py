@@ -20,7 +20,16 @@ from wristctl.commands.recommend.answer import (
     files_table,
     sine_deg,
 )
-from wristctl.commands.recommend.expected import FAMILY, TOLERATED, Candidate, asked_for, expected, spread
+from wristctl.commands.recommend.expected import (
+    FAMILY,
+    SCALED,
+    TOLERATED,
+    TUNED,
+    Candidate,
+    asked_for,
+    expected,
+    spread,
+)
 from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
@@ -47,7 +56,6 @@ _SWINGS = ("rmse", "oscillation", "sustained")
 _RIGS_AT_LIMITS = 12
 # Time of a rollout at short steps over that of a search's; seconds of limits and figures, and of rehearsals.
 _CLOSELY, _DRAWN, _REHEARSED = 2.0, 6.0, 40.0
-TUNED, SCALED = "tuned", "scaled preset"
 # Relative difference of two gains that is none: a search begins at the preset, to its last bit but one.
 _ALIKE = 1e-9
 

@@ -27,6 +27,8 @@ FAMILY = "recommend"
 TOLERATED = 0.05
 # Rigs from which 95 % of them are told: of fewer, the ends would be the least and the largest error.
 ENOUGH = 40
+TUNED, SCALED = "tuned", "scaled preset"
+"""Where gains of a candidate are from."""
 
 
 class Candidate(NamedTuple):
@@ -34,7 +36,7 @@ class Candidate(NamedTuple):
 
     controller: str
     origin: str
-    """`tuned`, or `scaled preset`."""
+    """`TUNED` or `SCALED`; of feedforward empty."""
     gains: dict[str, float]
 
     @property
