@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import re
+import shlex
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -244,7 +245,9 @@ def test_measured_tensions_are_logged_held_against_the_model_and_exported(tmp_pa
     ratio = residuals["tension_ratio"][residuals["trial"] == 0].dropna()
     assert len(ratio) > 100 and ratio.iloc[-20:].median() == pytest.approx(1.5, rel=0.1)
     done = wristctl(tmp_path, "runs", "export", str(sealed.path), "--file", "log.csv")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0 and done.stdout.split() == ["log.csv"], done.stderr
+    next_command = shlex.split(done.stderr.partition("wristctl ")[2])
+    assert next_command == ["identify", "log.csv", "--config", str(sealed.path / "config.yaml")]
     exported = pd.read_csv(tmp_path / "log.csv")
     told = exported[["time [s]", "tension_1 [N]"]].dropna()
     assert np.allclose(exported["mass [kg]"], 0.198), "as the facts say it"

@@ -2,6 +2,7 @@
 
 import logging
 import re
+import shlex
 from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import StrEnum
 from itertools import takewhile
@@ -18,7 +19,7 @@ from wristctl.config.choices import CONTROLLERS
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.records import Run, open_run
 from wristctl.records.index import DRAWN
-from wristctl.records.manifest import read_overview
+from wristctl.records.manifest import CONFIG, read_overview
 
 _log = logging.getLogger(__name__)
 
@@ -175,4 +176,9 @@ def export(
 
     run = open_run(ref, out)
     with run.reading():
-        say(export_run(run, to, file))
+        path = export_run(run, to, file)
+        say(path)
+    if run.kind == "hw-run" and to != "mat":
+        command = ("wristctl", "identify", str(path), "--config", str(run.file(CONFIG)))
+        with listening(False, False):
+            _log.info("to identify it, with the wrist of this run: %s", shlex.join(command))
