@@ -187,3 +187,12 @@ def test_an_answer_names_its_scenario_wrist_and_gains_and_of_repetitions_has_a_t
     (shown,) = [line.split() for line in several.lines() if line.startswith("RMSE ")]
     assert shown[-1] == "deg" and float(shown[1]) == pytest.approx(np.degrees(5.0), rel=5e-3), "as people read it"
     assert simulate(repeated("smc/exchanged")).answer.table is None
+
+
+@pytest.mark.parametrize(("command", "settings"), [("simulate", {"horizon": 0.5}), ("analyse", {"angles_deg": [0.0]})])
+def test_an_answer_says_where_the_rest_is_of_a_run_and_of_a_result_in_memory(
+    command: str, settings: dict[str, Any], tmp_path: Path
+) -> None:
+    call = getattr(wristctl, command)
+    told = [call(controller="pid-ff", **settings, **kept).answer.more for kept in ({}, {"out": tmp_path})]
+    assert [(".tables" in more, "--all" in more) for more in told] == [(True, False), (False, True)]

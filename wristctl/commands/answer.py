@@ -59,6 +59,11 @@ class Answer:
         return "\n".join(self.lines())
 
 
+def rest(what: str, run: str) -> str:
+    """Where the rest of an answer is, and `what` that is; `run` is the run's path, empty for a result in memory."""
+    return f"{what}: {'`--all`, or report.html of the run' if run else '`.tables` and `.figures`'}."
+
+
 def _lines(note: str | Table) -> list[str]:
     if isinstance(note, Table):
         return note.text(COLUMNS, _DIGITS).split("\n")

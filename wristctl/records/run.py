@@ -52,6 +52,9 @@ class Run:
         self.path = full_path.parent.resolve() / full_path.name  # a link stays one: what is deleted is the link
         self._asked: list[str] = []  # files, in the order in which they were asked for
 
+    def __repr__(self) -> str:
+        return f"Run({str(self.path)!r})"
+
     @property
     def id(self) -> str:
         """The directory's name."""

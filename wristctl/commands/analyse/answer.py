@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import joined
 from wristctl.commands.quantities import Quantity, table_of
 
@@ -63,10 +63,13 @@ def decibels(factor: float) -> float:
     return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
-def answer_of(label: str, records: Sequence[Mapping[str, Any]], analyses: Sequence[LoopAnalysis]) -> Answer:
-    """The answer for one screen; `records` are rows of the main table, one for each resting angle."""
+def answer_of(label: str, records: Sequence[Mapping[str, Any]], analyses: Sequence[LoopAnalysis], run: str) -> Answer:
+    """The answer for one screen; `records` are rows of the main table, one for each resting angle.
+
+    `run` is the path of the run, empty for a result in memory.
+    """
     angles = [record["angle_deg"] for record in records]
-    more = "Root locus, limits of linearity and all columns: --all."
+    more = rest("Root locus, limits of linearity and all columns", run)
     stable = all(record["stable"] for record in records)
     if all(analysis.is_open for analysis in analyses):
         said = f"{label} feeds nothing back: there is no loop, and no margin; the plant alone is shown"

@@ -24,7 +24,7 @@ from wristctl.commands.analyse.hysteresis_tables import (
     still_change,
     turn_of,
 )
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.quantities import Quantity, documented, table_of
 from wristctl.commands.results import StudyResult
@@ -117,9 +117,8 @@ def _answer(found: Hysteresis) -> Answer:
         toward = math.degrees(math.atan2(own.toward[1], own.toward[0])) % 360.0
         aside = f"friction takes the wrist off that line by {degrees(own.aside, 3)} deg at most"
         notes.append(f"In two planes ({why_two}), bent {toward_words(toward)}; {aside}.")
-    where = f", or {found.place}/report.html" if found.place else ""
     sentence = _of_wrist(own, middle_band(found.dead_bands, main))
-    return Answer(sentence, table_of("", quantities, records), notes, f"Every loop: --all{where}.")
+    return Answer(sentence, table_of("", quantities, records), notes, rest("Every loop", found.place))
 
 
 def _of_wrist(loop: HysteresisLoop, band: DeadBand | None) -> str:

@@ -122,7 +122,7 @@ class Analysed(StudyResult):
     @property
     def answer(self) -> Answer:
         """Whether the loop is stable, with its least margins."""
-        return answer_of(self.label, self.records(), self.found)
+        return answer_of(self.label, self.records(), self.found, self.place)
 
     @property
     def fault(self) -> UserError | None:

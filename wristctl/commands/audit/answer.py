@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table, capital, degrees, joined
 from wristctl.config.loop import LOOPS
 
@@ -28,10 +28,11 @@ _CONTINUOUS = 100.0
 # Verdict where motions or loops differ.
 _OPEN = "not specified enough"
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-_MORE = "Settling, pushes and every claim with its reason: add --all, or see report.html of the run."
 
 
-def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> Answer:
+def answer_of(
+    judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf, run: str = ""
+) -> Answer:
     """What holds, the heaviest claims with both numbers, and what is contradicted, open or not tested.
 
     One screen; sentences are left out from the end.
@@ -44,6 +45,8 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
         Claims over the box of unknowns.
     limit
         Tension limit of the wrist's tendons [N].
+    run
+        Path of the run; empty for a result in memory.
     """
     claims = [j for j in judged if j.verdict is not None]
     loops = list(dict.fromkeys(name for j in claims for name in j.found if name))
@@ -53,8 +56,9 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     first, *second = [" ".join(part) for part in (_over_the_box(strips), ranked) if part] or [""]
     networks = " ".join(_networks(claims))
     decided = [first] if first else []
-    rest = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
-    return Answer(sentence, table, decided, _MORE).ending(rest)
+    sentences = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
+    more = rest("Settling, pushes and every claim with its reason", run)
+    return Answer(sentence, table, decided, more).ending(sentences)
 
 
 def _tried(loops: Sequence[str], limit: float) -> list[str]:

@@ -45,7 +45,7 @@ class Audited(StudyResult):
         """What of the paper holds, for one screen."""
         from wristctl.commands.audit.answer import answer_of
 
-        return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit)
+        return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit, self.place)
 
     def frame(self) -> pd.DataFrame:
         """One row per claim: the paper's value, verdict and reason, and on each loop our range, verdict and mark."""

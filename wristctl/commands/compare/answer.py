@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.commands.printed_table import Table, capital, joined
 from wristctl.commands.ranking_answer import (
@@ -63,7 +63,7 @@ def answer_of(
         gains = {short.get(label, label): values for label, values in (gains or {}).items()}
         asked = [short.get(label, label) for label in asked]
     names = names_of(rankings)
-    more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
+    more = rest("Every rank and figure", run)
     notes = [
         bending,
         not_to_use(rankings, names),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Container, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.hw_run.trial_means import completed, means, quantities, with_simulation
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.quantities import table_of
@@ -39,7 +39,7 @@ def answer_of(
 
     done = completed(trials)
     compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
-    more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
+    more = rest("All tables, every trial", run)
     larger, smaller = _apart(compared, labels)
     kinder = [*larger, *swings_apart(done, twins, ("simulation",))]
     kinder[-1:] = [f"{last} Do not rely on that simulation here." for last in kinder[-1:]]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.identify.answer import comparison_on, recommendation_for, simulation_of
 from wristctl.commands.identify.logs import logs_of
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
@@ -223,4 +223,4 @@ def _answer(result: BendsTold) -> Answer:
             f"$ {simulation_of(run, f'{run}/config.yaml')} --reference circumduction",
             *[f"$ {comparison_on(run)}"] * square,
         ]
-    return Answer(f"{springs} {left}", told_table(told).within(COLUMNS), notes, "Figures: --all.")
+    return Answer(f"{springs} {left}", told_table(told).within(COLUMNS), notes, rest("Figures", result.place))

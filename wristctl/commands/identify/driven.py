@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.identify.answer import bound_of_delay, recommendation_by_ratios
 from wristctl.commands.inputs import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
@@ -160,5 +160,4 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> An
         )
     if run and known:
         notes += recommendation_by_ratios(run, found.robot.drive == "tension" and "stiffness" in known)
-    more = "Errors of each model, figures: --all, or the run's report.html."
-    return Answer(sentence, told_table(told).within(COLUMNS), notes, more)
+    return Answer(sentence, told_table(told).within(COLUMNS), notes, rest("Errors of each model, figures", run))

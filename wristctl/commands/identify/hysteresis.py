@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.identify.logs import logs_of
 from wristctl.commands.inputs import check_sides
 from wristctl.commands.printed_table import Table, degrees, two
@@ -82,8 +82,7 @@ class LoopTold(StudyResult):
     @property
     def answer(self) -> Answer:
         """The loop's own shape, then what was found."""
-        where = f", or {self.place}/report.html" if self.place else ""
-        return loop_answer(self.fits, self.study.wrist, f"All that was fitted: --all{where}.")
+        return loop_answer(self.fits, self.study.wrist, rest("All that was fitted", self.place))
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the loop does not tell it, and unit."""

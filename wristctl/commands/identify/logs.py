@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.identify.answer import bound_of_delay, recommendation_by_ratios
 from wristctl.commands.identify.driven import DRAWN, TRIED, DrivenTold, driven_plan, identify_driven, keep_prediction
 from wristctl.commands.inputs import RATIOS
@@ -261,9 +261,4 @@ def told_answer(
         notes.append(f"Stiffness in N m/rad is not identifiable: it needs tension_1 [N], ... of all tendons{more}.")
     if run and any(one.known for one in fit.told.values()):
         notes += recommendation_by_ratios(run, "force" in fit.told and fit.told["force"].known)
-    return Answer(
-        sentence,
-        told_table(fit.told).within(COLUMNS),
-        notes,
-        "Errors of each model, figures: --all, or the run's report.html.",
-    )
+    return Answer(sentence, told_table(fit.told).within(COLUMNS), notes, rest("Errors of each model, figures", run))

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.course_table import course_of_trajectory
 from wristctl.commands.inputs_of_loops import asked_of_simulation
 from wristctl.commands.printed_table import Table, degrees, joined, two
@@ -56,7 +56,7 @@ class Simulated(StudyResult):
     @property
     def answer(self) -> Answer:
         """The scenario and how it ends; why a loop does not arrive, and what may help."""
-        return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
+        return answer(self.simulated or self.study, self.repeated, self.place, self.short_of, self.advice, self.wrist)
 
     @property
     def course(self) -> pd.DataFrame:
@@ -140,18 +140,20 @@ _FIGURES = {
 _WORDS = {
     "rmse": "RMSE", "rmse_ulnar": "RMSE toward ulnar", "rmse_flexion": "RMSE toward flexion",
     "steady_state": "error at the end", "peak_tension": "largest tension",
-    "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip",
+    "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip from one arc's",
     "saturation": "share of time out of reach",
 }  # fmt: skip
 # Overshoot [%] from which it is told.
 _OVERSHOOT = 0.5
 
 
-def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[str] = (), wrist: str = "") -> Answer:
+def answer(
+    study: Study, repeated: Repeated, run: str = "", reason: str = "", advice: Sequence[str] = (), wrist: str = ""
+) -> Answer:
     """The answer of a loop that was simulated once or several times, of a study with the loop as it was simulated.
 
-    `reason` says why it does not arrive, `advice` in paragraphs and commands what to do about it, and `wrist` which one
-    it is, where it is not told by its parameters.
+    `run` is the path of the run, empty for a result in memory; `reason` says why it does not arrive, `advice` in
+    paragraphs and commands what to do about it, and `wrist` which one it is, where it is not told by its parameters.
     """
     from wristctl.simulation.planes import why_two
 
@@ -169,7 +171,7 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     median = f" Figures are medians of {count} repetitions." * (count > 1)
     sentence = f"{motion} on {place}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
     table = _table(repeated) if two or count > 1 else None
-    return Answer(sentence, table, advice, "All metrics: `--all`; the motion and its figures: report.html of the run.")
+    return Answer(sentence, table, advice, rest("All metrics, the motion and its figures", run))
 
 
 def _faults(repeated: Repeated) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
@@ -29,7 +29,7 @@ def answer_of(
     if not rankings:
         return None
     names = names_of(rankings)
-    more = f"Every controller: `--all`, or {run}/report.html." if run else "Every controller: `.tables`."
+    more = rest("Every controller", run)
     notes: list[str | Table] = [
         bending,
         terms_table(terms) if terms else "",

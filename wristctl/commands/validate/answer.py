@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table, joined
 from wristctl.commands.quantities import told_table
 
@@ -42,8 +42,8 @@ def validated_answer(
         wanted_terms(models),
         f"{robot.parts[0].upper()}{robot.parts[1:]}. {_caveats(robot, chosen)}",
     ]
-    more = f"Parameters, each recording, residuals: --all, or {run}/report.html." if run else ""
-    return Answer(sentence, models_table(robot, models, beside), notes, f"{robot.citation}. {more}".strip())
+    more = rest("Parameters, each recording, residuals", run)
+    return Answer(sentence, models_table(robot, models, beside), notes, f"{robot.citation}. {more}")
 
 
 def wanted_terms(models: Sequence[TriedModel]) -> str:
