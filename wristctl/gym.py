@@ -15,6 +15,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -83,15 +84,20 @@ class _Episodes:
     """The episodes of a study's loop or family, so many at a time: each number is a world, a motion and its noise."""
 
     def __init__(
-        self, study: Study | None, family: str, split: str, count: int, network: Inverse | None, actions: Given
-    ) -> None:
+        self, study: Study | str | Path | None, family: str, split: str, count: int, network: Inverse | None,
+        actions: Given,
+    ) -> None:  # fmt: skip
         from wristctl.control.law import NOW
         from wristctl.simulation.drawn_worlds import asked_of
         from wristctl.simulation.planes import Asked, planes_of
         from wristctl.simulation.stepped_loops import largest_torque, places_of
         from wristctl.simulation.worlds import loop_facing
+        from wristctl.study_files.load import load_study
 
-        self.study, self.family, self.split = study or Study(), family, split
+        if count < 1:
+            raise UserError(f"{count} wrists", "num_envs", "at least 1")
+        self.study = load_study([Path(study)]) if isinstance(study, str | Path) else study or Study()
+        self.family, self.split = family, split
         if family and family not in self.study.families:
             fix = meant(family, self.study.families) if self.study.families else "families: in the study"
             raise UserError(f"no family {family!r}", "family", fix)
@@ -146,10 +152,20 @@ class _Episodes:
             ) from error
         return self._seen()[:3]
 
-    def step(self, actions: Array) -> tuple[Array, Array, Any, Array]:
-        """After a sample with these actions (count, A): observations, true bends, who has failed, and rewards."""
+    def step(self, given: Any) -> tuple[Array, Array, Any, Array]:
+        """After a sample with these actions (count, A): observations, true bends, who has failed, and rewards.
+
+        Of one number each the last axis, and of one wrist the first, may be left out.
+        """
         if self.loops is None or self.loops.done:
             raise gymnasium.error.ResetNeeded("reset before the first step, and after an episode's end")
+        actions, (entries,) = np.asarray(given, np.float64), self.action_space.shape
+        shapes = [(self.count, entries), *[(entries,)] * (self.count == 1), *[(self.count,)] * (entries == 1)]
+        if actions.shape not in [*shapes, *[()] * (shapes[0] == (1, 1))]:
+            raise UserError(
+                f"actions of shape {actions.shape}", "step(action)", f"{shapes[1 if self.count == 1 else 0]}"
+            )
+        actions = actions.reshape(self.count, entries)
         if not np.isfinite(actions).all():
             raise UserError("an action that is no number", "step(action)", "a finite one")
         self.loops.step(self.largest * actions)
@@ -209,6 +225,7 @@ class _Episodes:
 class WristEnv(gymnasium.Env[Array, Array]):
     """One closed loop of a study: its `simulate` section's, or with `family` the worlds of a family one after another.
 
+    `study` may be a study's file or an experiment's name, as in `wristctl.simulate`; None: that of defaults.
     It bends in P planes: the planes of the section's loop, or two where any world of the family leaves its plane.
     Observation (8 P,): `observed`. Action (P,): the torque that is wanted in each plane until the next step, a control
     period (1 ms where that is shorter) later, as a share of `largest` [N m]. With `actions="tensions"` it is (T,): the
@@ -226,7 +243,7 @@ class WristEnv(gymnasium.Env[Array, Array]):
 
     def __init__(
         self,
-        study: Study | None = None,
+        study: Study | str | Path | None = None,
         family: str = "",
         split: str = "learn",
         network: Inverse | None = None,
@@ -258,9 +275,8 @@ class WristEnv(gymnasium.Env[Array, Array]):
         return observed[0], self._told(theta, failed)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action until the next sample; UserError for one that is no number."""
-        shares = np.asarray(action, np.float64).reshape(1, *self._episodes.action_space.shape)
-        observed, theta, failed, reward = self._episodes.step(shares)
+        """Hold an action until the next sample; UserError for one of another shape, or that is no number."""
+        observed, theta, failed, reward = self._episodes.step(action)
         assert self._episodes.loops is not None
         return observed[0], float(reward[0]), False, self._episodes.loops.done, self._told(theta, failed)
 
@@ -279,7 +295,7 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
     def __init__(
         self,
         num_envs: int = 8,
-        study: Study | None = None,
+        study: Study | str | Path | None = None,
         family: str = "",
         split: str = "learn",
         network: Inverse | None = None,
@@ -315,13 +331,12 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
         return observed, self._told(theta, failed)
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Hold actions (num_envs, A) until the next sample; UserError for one that is no number."""
+        """Hold actions (num_envs, A) until the next sample; UserError for another shape, or what is no number."""
         never = np.zeros(self.num_envs, bool)
         if self._episodes.loops is not None and self._episodes.loops.done:
             observed, info = self.reset()
             return observed, np.zeros(self.num_envs), never, never.copy(), info
-        shares = np.asarray(actions, np.float64).reshape(self.num_envs, *self._episodes.action_space.shape)
-        observed, theta, failed, reward = self._episodes.step(shares)
+        observed, theta, failed, reward = self._episodes.step(actions)
         assert self._episodes.loops is not None
         ended = np.full(self.num_envs, self._episodes.loops.done)
         return observed, reward, never, ended, self._told(theta, failed)

@@ -220,8 +220,25 @@ def test_what_cannot_be_stepped_says_how_to_mend_it(tmp_path: Path) -> None:
     env.reset()
     with pytest.raises(UserError, match="no number"):
         env.step(np.array([np.nan]))
-    with pytest.raises(ValueError, match="reshape"):
+    with pytest.raises(UserError, match=r"actions of shape \(2,\) .*fix: \(1,\)"):
         env.step(np.zeros(2))
+    with pytest.raises(UserError, match="0 wrists - num_envs"):
+        WristVectorEnv(0)
+    with pytest.raises(UserError, match=r"there is no study file .*nosuch"):
+        WristEnv("nosuch")
+
+
+def test_many_wrists_take_actions_of_their_own_shape_alone() -> None:
+    """A wrist's actions stand in a row: turned by a quarter they have as many numbers, and would be others'."""
+    study = load_study([], ["wrist.tendons=three", "simulate.reference=circumduction", "simulate.horizon=0.1"])
+    env = WristVectorEnv(2, study, actions="tensions")
+    env.reset()
+    with pytest.raises(UserError, match=r"actions of shape \(3, 2\) .*fix: \(2, 3\)"):
+        env.step(np.zeros((3, 2)))
+    env.step(np.zeros((2, 3)))
+    flat = WristVectorEnv(2, load_study([], N))
+    flat.reset()
+    assert flat.step(np.zeros(2))[0].shape == flat.step(np.zeros((2, 1)))[0].shape == (2, 8)
 
 
 @pytest.mark.slow

@@ -240,5 +240,5 @@ def test_what_is_no_action_is_said() -> None:
     with pytest.raises(UserError, match="these actions are tensions - torque"):
         _ = env.torque
     env.reset()
-    with pytest.raises(ValueError, match="reshape"):
+    with pytest.raises(UserError, match=r"actions of shape \(2,\) .*fix: \(3,\)"):
         env.step(np.zeros(2))

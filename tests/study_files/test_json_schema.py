@@ -50,6 +50,12 @@ def test_every_experiment_is_one(validator: Draft202012Validator, file: Path) ->
     assert refused(validator, file.read_text(encoding="utf-8")) == []
 
 
+def test_a_motion_by_its_name_alone_is_one_where_it_is_known(validator: Draft202012Validator) -> None:
+    text = "simulate: {{reference: {}}}\ncompare: {{references: [{{kind: step}}, {}, my.py:MINE]}}\n"
+    assert not refused(validator, text.format("sine", "ramp"))
+    assert len(refused(validator, text.format("sin", "ramp"))) == len(refused(validator, text.format("sine", "2"))) == 1
+
+
 Leaf = tuple[tuple[str, ...], FieldInfo]
 
 
@@ -137,5 +143,5 @@ def test_an_editor_shows_unit_meaning_range_and_choices() -> None:
     length = sections["WristParameters"]["properties"]["length"]
     assert length["exclusiveMinimum"] == 0 and length["default"] == 0.08
     assert length["description"].startswith("[m] arc length from the first to the last disc")
-    kind = sections["Reference"]["properties"]["kind"]
+    kind = sections["Reference"]["anyOf"][1]["properties"]["kind"]
     assert "minimum-jerk" in json.dumps(kind)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wristctl.config.loop import LOOPS, Loop
+from wristctl.config.loop import LOOPS, Loop, Reference
 from wristctl.config.plant import Actuator, Plant
 from wristctl.config.study import Study
 from wristctl.errors import UserError
@@ -336,3 +336,24 @@ def test_a_file_that_is_not_there_is_likened_by_its_own_name_and_not_by_its_end(
         with pytest.raises(UserError) as alike:
             load_study([Path(near)])
         assert alike.value.fix == "did you mean 'mywrist.yaml'?"
+
+
+def test_a_motion_may_be_given_by_its_name_alone(tmp_path: Path) -> None:
+    """In a file, as an override and within a list, beside others in full; an unknown one is an unknown kind."""
+    file = tmp_path / "study.yaml"
+    listed = "[sine, {kind: step, angle_deg: 10}, ramp]"
+    file.write_text(f"simulate: {{reference: circumduction}}\ncompare: {{controllers: pid-ff, references: {listed}}}\n")
+    for study in (
+        load_study([file]),
+        load_study(
+            [],
+            ["simulate.reference=circumduction", "compare.controllers=pid-ff", f"compare.references={listed}"],
+        ),
+    ):
+        assert study.simulate.reference == Reference(kind="circumduction")
+        assert [each.kind for each in study.compare.references] == ["sine", "step", "ramp"]
+        assert study.compare.references[1].angle_deg == 10.0
+        assert [row.controller for row in study.compare.rows] == ["pid-ff"]
+    file.write_text("simulate:\n  reference: circumducton\n")
+    with pytest.raises(UserError, match=r"study\.yaml:2: simulate\.reference\.kind - fix: did you mean 'circ"):
+        load_study([file])

@@ -37,6 +37,9 @@ def study_schema() -> dict[str, Any]:
     for key in LISTS_OF_ROWS:
         place = sections[schema["properties"][key]["$ref"].rpartition("/")[2]]["properties"]
         place |= {short: sections["Row"]["properties"][short] for short in keys_of(Row)}
+    for name, section in sections.items():
+        if "kind" in section.get("properties", ()):
+            sections[name] = {"anyOf": [section["properties"]["kind"], section]}
     include = {"type": "array", "items": {"type": "string"}, "description": "study files that are read before this one"}
     schema["properties"] = {"include": include} | schema["properties"]
     return {"$schema": _DRAFT, "title": "Study of wristctl", **{k: v for k, v in schema.items() if k != "title"}}

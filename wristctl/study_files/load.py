@@ -241,7 +241,8 @@ def _today(document: Document, where: Phrase, file: Path | None, former: NewName
 
     The files and the code that it names have their whole paths, which count from the file, or else from here.
     """
-    document = with_gains_apart(with_keys_of_today(document, where, former), where)
+    document = with_keys_of_today(document, where, former)
+    document = with_gains_apart(Document(_all_in_full(document.data, lines := dict(document.lines)), lines), where)
     folder = file.parent if file else Path()
     return Document(placed(_found_from(document.data, folder), file), document.lines)
 
@@ -265,6 +266,18 @@ def _override(where: Setting, command: str | None) -> Document:
     for key in reversed(keys):
         data = {key: data}
     return Document(data, {})
+
+
+def _all_in_full(data: Any, lines: dict[KeyPath, int], path: KeyPath = ()) -> Any:
+    """Data of a study file, with a name alone as what it stands for, as `in_full` has it; its line is that of each."""
+    if isinstance(data, dict):
+        return {key: _all_in_full(item, lines, (*path, key)) for key, item in data.items()}
+    if isinstance(data, tuple):
+        return tuple(_all_in_full(item, lines, (*path, position)) for position, item in enumerate(data))
+    whole = in_full(data, path)
+    if isinstance(whole, dict) and path in lines:
+        lines |= {(*path, key): lines[path] for key in whole}
+    return whole
 
 
 def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:
