@@ -70,7 +70,7 @@ def test_a_rig_says_what_takes_a_wrist_that_its_motors_do_not_wind(call: Call, m
     code, _, err = call("hw-run", *motion, "--set", inner, "--dry-run")
     assert code == 2 and "ends inside the wrist" in err and "planes=2" not in err
     code, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--set", "hw-run.load_cells={}", "--dry-run")
-    assert code == 2 and "load_cells of a board are of the tendons 1, 2, 4 and 5" in err
+    assert code == 2 and "load_cells: a board's go with the tendons 1, 2, 4 and 5" in err
     _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=six", "--dry-run")
     assert "4 axes" in err and "6 tendons off its axis" in err and "wristctl identify" in err
 

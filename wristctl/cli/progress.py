@@ -148,7 +148,11 @@ class Bar:
             self._bar.update(self._task, total=1.0, completed=passed / (passed + left))
 
     def _left(self) -> str:
-        return "compiling, kept for later runs" if COMPILE_TIME.goes_on else left_words(self._ahead.seconds_left(self._count))
+        return (
+            "compiling, kept for later runs"
+            if COMPILE_TIME.goes_on
+            else left_words(self._ahead.seconds_left(self._count))
+        )
 
 
 class _Left(ProgressColumn):

@@ -11,7 +11,7 @@ from wristctl.board.messages import AXES
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.rig_belief import PLANES, names_of_planes, numbers_of, places_of_tendons, pull_directions
-from wristctl.trial.rig_words import AGAINST, DEAD, words_of_board, words_of_rig
+from wristctl.trial.rig_words import AGAINST, why_dead, words_of_board, words_of_rig
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Reading
@@ -250,10 +250,10 @@ class ExpectedMoves:
         problem = f"{self._words.names[axis]} has the wrong sense: a smaller target reels it in"
         return SafetyStop(problem, "homing", f"turn the sign of {self._words.names[axis]} in send() and connect()")
 
-    def does_not_bend(self, axis: int) -> SafetyStop:
-        """The stop of a motor that bends the wrist nowhere."""
+    def does_not_bend(self, axis: int, one_way: bool) -> SafetyStop:
+        """The stop of a motor that bends the wrist nowhere, tried the `one_way` that a calibration says or both."""
         problem = f"{self._words.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm"
-        return SafetyStop(f"{problem}; likely {DEAD}", "homing", self._words.dead.format(axis=axis))
+        return SafetyStop(f"{problem}; likely {why_dead(one_way)}", "homing", self._words.dead.format(axis=axis))
 
     def bent_too_far(self, axis: int, bend: Bend) -> SafetyStop:
         """The stop of a motor that bends the wrist further than homing does."""

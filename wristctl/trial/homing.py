@@ -166,7 +166,7 @@ class Finder:
                     self._expected.judge_side(axis, moved)
                     return reeled
             self._let_go(axis, 0)
-        raise self._expected.does_not_bend(axis)
+        raise self._expected.does_not_bend(axis, len(tried) == 1)
 
     def slacken(self) -> None:
         """Let all tendons go, so far that none holds against another while it is measured. SafetyStop where it sags."""

@@ -113,3 +113,8 @@ def words_of_rig(numbers: Sequence[int], planes: Sequence[str]) -> Words:
         again="home again",
         stopped=f"cut the motors' power, {_LOOK}, then wristctl check-rig",
     )
+
+
+def why_dead(one_way: bool) -> str:
+    """What is likely with a motor that bends nothing, tried the `one_way` that a calibration says, or both."""
+    return "it turns the other way than hw-run.calibration says, or " * one_way + DEAD

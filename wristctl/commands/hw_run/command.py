@@ -83,7 +83,7 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     if layout_of_rig(settings, wrist) is not None and settings.rig is None:
         for key in ("load_cells", "calibration"):
             if getattr(settings, key):
-                problem = f"{key} of a board are of the tendons 1, 2, 4 and 5, and this wrist has others"
+                problem = f"{key}: a board's go with the tendons 1, 2, 4 and 5, and this wrist has others"
                 raise UserError(problem, key, "leave it out: the wrist is homed anew")
     check_two_planes([World(settings.loop, wrist)])
     through = settings.reference.inverse == "network"
