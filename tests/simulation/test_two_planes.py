@@ -215,6 +215,19 @@ def test_the_picture_draws_what_is_wanted_followed_and_in_reach() -> None:
     assert np.hypot(*np.array(lines["in reach"]).T).max() == pytest.approx(WRIST.range_deg)
 
 
+@pytest.mark.parametrize(("angle", "words"), [(0.0, "ulnar"), (90.0, "flexion"), (180.0, "radial"), (-45.0, "-45 deg")])
+def test_a_motion_along_a_line_is_drawn_over_time_toward_where_it_bends(angle: float, words: str) -> None:
+    toward = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    path = np.zeros((2, 3, 501))
+    path[:, 0] = np.deg2rad(20.0) * np.outer(toward, np.sin(np.arange(501) / 160.0))
+    course = followed(path)
+    axes = bend_motion(course, reach_of_bends(WRIST, TendonLayout.of(WRIST))).axes[-1]
+    lines = {line.get_label(): np.array(line.get_xydata()) for line in axes.get_lines()}
+    assert set(lines) == {"wanted", "followed"} and f"toward {words}" in axes.get_ylabel()
+    assert lines["wanted"].max() == pytest.approx(20.0, rel=1e-3)
+    assert lines["followed"] == pytest.approx(np.column_stack([course.time, np.rad2deg(course.bend @ toward)]))
+
+
 def test_what_cannot_run_is_said() -> None:
     with pytest.raises(UserError, match="no bend path 'square'"):
         bend_path("square", 10.0, 1.0, 1.0)

@@ -14,7 +14,7 @@ from wristctl.commands.truth_table import truth_heading
 from wristctl.config.study import Study
 from wristctl.control.law import Surface
 from wristctl.control.table import controller, gains_of
-from wristctl.plotting.bend_figure import bend_motion
+from wristctl.plotting.bend_figure import bend_motion, line_of
 from wristctl.plotting.loop_figures import in_parts, one_motion, over_time, spread_of_sizes, tensions
 from wristctl.plotting.spatial_view import motion_in_space
 from wristctl.plotting.style import (
@@ -137,7 +137,8 @@ def draw_bends(session: Session, study: Study, repeated: Repeated) -> None:
     wrist, loop, findings, course = study.wrist, study.simulate.loop, session.findings, repeated.first.trajectory
     world, reach = truth_heading(wrist, loop), reach_of_bends(wrist, TendonLayout.of(wrist))
     findings.overview.figure = "bends"
-    caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
+    bends = "Bend" if line_of(course.bend_ref) is not None else "The plane of bends with what the tendons reach"
+    caption = f"{bends}; errors of both planes and pulls over time"
     findings.figure("bends", bend_motion, course, reach, world, caption=caption)
     caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
     findings.figure(
