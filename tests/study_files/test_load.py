@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from wristctl.config.loop import LOOPS, Loop, Reference
-from wristctl.config.plant import Actuator, Plant
+from wristctl.config.plant import Actuator, Plant, Sensor
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
@@ -357,3 +357,13 @@ def test_a_motion_may_be_given_by_its_name_alone(tmp_path: Path) -> None:
     file.write_text("simulate:\n  reference: circumducton\n")
     with pytest.raises(UserError, match=r"study\.yaml:2: simulate\.reference\.kind - fix: did you mean 'circ"):
         load_study([file])
+
+
+def test_sensor_and_motors_may_be_given_by_their_level_alone(tmp_path: Path) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text("simulate: {loop: {sensor: camera, actuator: {level: tendon, friction: 0.2}}}\n")
+    for study in (load_study([file]), load_study([file], ["simulate.loop.actuator=tendon"])):
+        loop = study.simulate.loop
+        assert (loop.sensor, loop.actuator) == (Sensor(level="camera"), Actuator(level="tendon", friction=0.2))
+    with pytest.raises(UserError, match=r"loop\.sensor\.level - fix: did you mean 'camera'"):
+        load_study([file], ["simulate.loop.sensor=camra"])

@@ -8,6 +8,7 @@ from typing import Any
 from wristctl.config.controller_row import Row
 from wristctl.config.study import Study
 from wristctl.study_files.keys import LISTS_OF_ROWS, keys_of
+from wristctl.study_files.keywords import NAMED_BY
 
 # Name of the schema beside a study file, and the line with which a file names it to an editor.
 SCHEMA_FILE = "study.schema.json"
@@ -38,8 +39,9 @@ def study_schema() -> dict[str, Any]:
         place = sections[schema["properties"][key]["$ref"].rpartition("/")[2]]["properties"]
         place |= {short: sections["Row"]["properties"][short] for short in keys_of(Row)}
     for name, section in sections.items():
-        if "kind" in section.get("properties", ()):
-            sections[name] = {"anyOf": [section["properties"]["kind"], section]}
+        for named_by in NAMED_BY:
+            if named_by in section.get("properties", ()):
+                sections[name] = {"anyOf": [section["properties"][named_by], section]}
     include = {"type": "array", "items": {"type": "string"}, "description": "study files that are read before this one"}
     schema["properties"] = {"include": include} | schema["properties"]
     return {"$schema": _DRAFT, "title": "Study of wristctl", **{k: v for k, v in schema.items() if k != "title"}}

@@ -12,6 +12,9 @@ from wristctl.study_files.keys import field_at, home_of, keys_of, section_keys
 from wristctl.study_files.resolved import check_read, key_below
 from wristctl.study_files.strict_yaml import KeyPath
 
+NAMED_BY = "kind", "level"
+"""What of a group its name alone stands for: `reference: sine`, `sensor: camera`."""
+
 
 def function_of(command: str) -> str:
     """Name of the Python function of a command."""
@@ -44,15 +47,15 @@ def path_of(name: str, command: str) -> KeyPath:
 
 
 def in_full(value: Any, path: KeyPath) -> Any:
-    """A text where a list of names stands, or a group with a `kind`, as such a list or group."""
+    """A text where a list of names stands, or a group with a `kind` or a `level`, as such a list or group."""
     if not isinstance(value, str):
         return value
     kind, (item, fields) = field_at(path)[0], (field_at((*path, 0))[0], keys_of(field_at(path)[0]))
-    if "kind" in fields:
-        return {"kind": value}
+    if named := [name for name in NAMED_BY if name in fields]:
+        return {named[0]: value}
     item = get_args(item)[0] if get_origin(item) is Annotated else item
-    named = item in (str, Row) or get_origin(item) is Literal
-    return (value,) if get_origin(kind) is tuple and named else value
+    of_names = item in (str, Row) or get_origin(item) is Literal
+    return (value,) if get_origin(kind) is tuple and of_names else value
 
 
 def as_a_file_has_it(value: Any, where: Keyword) -> Any:
