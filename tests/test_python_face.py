@@ -77,7 +77,9 @@ def test_the_documented_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: 
 
 def test_dir_shows_the_face_and_every_function_of_it_is_explained() -> None:
     assert (
-        {name for name in dir(wristctl) if not name.startswith("_")} == FACE == set(wristctl.__all__) - {"__version__"}
+        {name for name in dir(wristctl) if not name.startswith("_")}
+        == {*FACE, "UserError"}
+        == set(wristctl.__all__) - {"__version__"}
     )
     for name in FACE:
         function = getattr(wristctl, name)
@@ -116,6 +118,12 @@ THREE: WristKeys = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
 
 
 @pytest.mark.slow
+def test_what_load_study_is_given_is_a_file_and_overrides() -> None:
+    for given in list[Any]([(None, {"simulate": {"horizon": 2}}), ({"wrist": {}},)]):
+        with pytest.raises(wristctl.UserError, match=r"a dict is neither .*fix: text, \"simulate\.horizon=2\""):
+            wristctl.load_study(*given)
+
+
 def test_a_wrist_in_plain_arguments_moves_as_that_of_a_study_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\nsimulate: {horizon: 1.2}\n")

@@ -15,7 +15,7 @@ In a notebook:
     wristctl.open_run("latest:compare").data("comparison")
 
 `gen_data`, `train`, `tune`, `study`, `hw_run`, `analyse`, `identify`, `recommend` and `audit` go the same way:
-wristctl.api.
+wristctl.api. What a person can mend is raised as `wristctl.UserError`.
 """
 
 from __future__ import annotations
@@ -42,8 +42,10 @@ if TYPE_CHECKING:
         train,
         tune,
     )
+    from wristctl.errors import UserError
 
 __all__ = [
+    "UserError",
     "__version__",
     "analyse",
     "audit",

@@ -87,6 +87,10 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
     a file's; what is to win over them is given to the command: `simulate(study, wrist={"damping": 0.2})`. `trust_code`
     lets the code run that a run carries.
     """
+    if others := [given for given in (file, *overrides) if not isinstance(given, str | Path | None)]:
+        what = f"a {type(others[0]).__name__} is neither a file nor an override"
+        fix = 'text, "simulate.horizon=2"; or give it to the command: simulate(horizon=2.0)'
+        raise UserError(what, "load_study", fix)
     return _load_study([Path(file)] if file else [], list(overrides), trust_code=trust_code, force=force)
 
 

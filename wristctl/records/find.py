@@ -155,7 +155,7 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
             why = f": {last.note}" if last.note else ""
             raise UserError(problem, f"{ref} in {results}", f"{last.id} (state: {last.state}{why})")
         ended = [run for run in entries if run.state == "ok"]
-        kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
+        kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind and run.label}
         if labels:
             raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
         if not kind:
@@ -219,8 +219,9 @@ def select(
         _check_metric(name, chosen, text)
         values = [_in_unit(entry, name, unit, typed) for entry in chosen]
         if unit and chosen and all(value is None for value in values):
-            has = dict.fromkeys(each for entry in chosen for each in _units(entry, name))
-            raise UserError(f"no run has {name} in {unit}", Argument("where", text), f"its unit: {' or '.join(has)}")
+            has = dict.fromkeys(each for entry in chosen for each in _units(entry, name) if each)
+            fix = f"its unit: {' or '.join(has)}" if has else "it has no unit"
+            raise UserError(f"no run has {name} in {unit}", Argument("where", text), fix)
         chosen = [
             entry for entry, value in zip(chosen, values, strict=True) if value is not None and compare(value, bound)
         ]

@@ -140,7 +140,7 @@ _FIGURES = {
 _WORDS = {
     "rmse": "RMSE", "rmse_ulnar": "RMSE toward ulnar", "rmse_flexion": "RMSE toward flexion",
     "steady_state": "error at the end", "peak_tension": "largest tension",
-    "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip from one arc's",
+    "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip to that of one arc",
     "saturation": "share of time out of reach",
 }  # fmt: skip
 # Overshoot [%] from which it is told.
