@@ -15,6 +15,7 @@ import wristctl
 from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands import printed_table as answer_lines
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs_of_loops import check_inverses
 from wristctl.commands.printed_table import degrees
 from wristctl.commands.simulate.command import SIMULATE
 from wristctl.commands.simulate.results import Simulated
@@ -143,8 +144,26 @@ def test_angles_beyond_what_the_network_learned_are_warned_of(
         course = replace(once.first.trajectory, outside=outside)
         caplog.clear()
         with caplog.at_level(logging.WARNING):
-            simulate(replace(once, first=replace(once.first, trajectory=course)))
+            done = simulate(replace(once, first=replace(once.first, trajectory=course)))
         assert ("25 % of the wanted tips lie outside" in caplog.text) == (outside > 0.0)
+        assert ("led by guesses: 25 % of its tips" in done.answer.sentence) == (outside > 0.0)
+
+
+def test_behind_a_network_the_error_to_the_angle_that_was_wanted_of_it_is_told(simulate: Simulate) -> None:
+    once = repeated("smc/exchanged")
+    own = once.first.trajectory
+    asked = replace(own, theta_desired=own.theta_ref + 0.1)
+    for course, told in ((own, False), (asked, True)):
+        found = replace(once, first=replace(once.first, trajectory=course))
+        assert ("wanted of the network" in simulate(found).answer.sentence) == told
+
+
+def test_a_network_that_no_reference_goes_through_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    network: Any = {"network": None}
+    for inverses, given, warned in (("none", {}, False), ("none", network, True), ("network", network, False)):
+        caplog.clear()
+        check_inverses([inverses], Inputs(given))
+        assert ("no reference goes through the network" in caplog.text) == warned
 
 
 def plan(*settings: str) -> str:
@@ -180,7 +199,10 @@ def test_an_answer_names_its_scenario_wrist_and_gains_and_of_repetitions_has_a_t
     for fact in ("30 deg radial in 1 s", "120 mm", "elastic tendons", "60 Hz", "5 ms", "Kp = 10, Ki = 2, Kd = 0.1"):
         assert fact in text, fact
     several = simulate(repeated("smc/exchanged", NINE, settling=3.0)).answer
-    assert several.table is not None and "9 repetitions" in several.table.columns[3]
+    assert several.table is not None and several.table.columns[1:4] == ("median of 9", "95 % low", "95 % high")
+    few = simulate(repeated("smc/exchanged", NINE[:5], settling=3.0)).answer
+    assert few.table is not None and few.table.columns == ("figure", "median of 5", "unit")
+    assert "95 % intervals take 6" in few.sentence and "intervals" not in several.sentence
     rows = {str(row[0]): row[1:] for row in several.table.rows}
     expected = spread(np.array(NINE))
     assert rows["RMSE"] == (5.0, expected.low, expected.high, "rad")

@@ -155,8 +155,10 @@ def answer(
     `run` is the path of the run, empty for a result in memory; `reason` says why it does not arrive, `advice` in
     paragraphs and commands what to do about it, and `wrist` which one it is, where it is not told by its parameters.
     """
+    from wristctl.comparison.repetition_spread import FEWEST
     from wristctl.simulation.planes import why_two
 
+    few = f"; 95 % intervals take {FEWEST}"
     chosen, count, course = study.simulate, len(repeated.failed), repeated.first.trajectory
     two, why = course.planes == 2, ""
     if two:
@@ -168,7 +170,7 @@ def answer(
     figures = "" if repeated.first.failed else joined(_told(repeated))
     there = f". There: {figures}" if figures else ""
     does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
-    median = f" Figures are medians of {count} repetitions." * (count > 1)
+    median = f" Figures are medians of {count} repetitions{'' if count >= FEWEST else few}." * (count > 1)
     sentence = f"{motion} on {place}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
     table = _table(repeated) if two or count > 1 else None
     return Answer(sentence, table, advice, rest("All metrics, the motion and its figures", run))
@@ -186,6 +188,8 @@ def _faults(repeated: Repeated) -> list[str]:
         faults.append(f"chatters: tensions go from limit to limit and back {repeated.chatter:.0f} times a second")
     if repeated.beyond > 0.0:
         faults.append(f"is not physical: {repeated.beyond:.3g} N in a tendon that bears {repeated.bears:g} N")
+    if (share := repeated.first.trajectory.outside) > 0.0:
+        faults.append(f"is led by guesses: {100.0 * share:.3g} % of its tips lie outside what the network learned")
     if repeated.drift > 0.0:
         by = f" by {degrees(repeated.drift)} deg" if math.isfinite(repeated.drift) else ""
         faults.append(f"is not settled numerically: the result changes{by} with the integration step")
@@ -202,8 +206,8 @@ def _told(repeated: Repeated) -> list[str]:
     if course.planes == 2:
         each = (("rmse_ulnar", "toward ulnar"), ("rmse_flexion", "toward flexion"), ("rmse", "over both"))
         errors = [f"{degrees(values[name])} deg {where}" for name, where in each]
-        return [f"RMSE {errors[0]}", *errors[1:], least]
-    parts = [f"RMSE {degrees(values['rmse'])} deg"]
+        return [f"RMSE {errors[0]}", *errors[1:], *_beside_wanted(repeated), least]
+    parts = [f"RMSE {degrees(values['rmse'])} deg", *_beside_wanted(repeated)]
     if math.isfinite(values["settling"]):
         parts.append(f"settled after {two(values['settling'])} s")
     parts.append(f"{degrees(values['steady_state'])} deg off at the end")
@@ -212,6 +216,16 @@ def _told(repeated: Repeated) -> list[str]:
     if at_rest(course) and not repeated.swing:
         parts.append("no swing at rest")
     return [*parts, least]
+
+
+def _beside_wanted(repeated: Repeated) -> list[str]:
+    """The error to the wanted angle, where a network stands before the reference and asks for another."""
+    import numpy as np
+
+    course = repeated.first.trajectory
+    if np.array_equal(course.theta_desired, course.theta_ref):
+        return []
+    return [f"{degrees(_estimate(repeated, 'rmse_desired').median)} deg to the angle wanted of the network"]
 
 
 def _estimate(repeated: Repeated, name: str) -> Spread:
@@ -225,17 +239,18 @@ def _estimate(repeated: Repeated, name: str) -> Spread:
 
 
 def _table(repeated: Repeated) -> Table:
-    """Figures of a loop, of several repetitions medians with 95 % intervals; nan where there is none."""
+    """Figures of a loop, of several repetitions medians, of enough with 95 % intervals; nan where there is none."""
+    from wristctl.comparison.repetition_spread import FEWEST
     from wristctl.simulation.metrics import metrics_in
 
-    planes, several = repeated.first.trajectory.planes, len(repeated.failed) > 1
+    planes, times = repeated.first.trajectory.planes, len(repeated.failed)
     metrics, rows = metrics_in(planes), []
     for name in _FIGURES[planes]:
         found, unit = _estimate(repeated, name), metrics["oscillation" if name == "swing" else name].unit
-        values = (found.median, found.low, found.high) if several else (found.median,)
+        values = (found.median, found.low, found.high) if times >= FEWEST else (found.median,)
         rows.append((_WORDS.get(name, name.replace("_", " ")), *values, unit))
-    count = f", {len(repeated.failed)} repetitions"
-    heads = ("median", "95 % low", f"95 % high{count}") if several else ("value",)
+    median = f"median of {times}" if times > 1 else "value"
+    heads = (median, "95 % low", "95 % high") if times >= FEWEST else (median,)
     return Table("", ("figure", *heads, "unit"), rows)
 
 
