@@ -132,6 +132,23 @@ def test_two_tunings_tell_no_interval_and_the_answer_says_so() -> None:
     assert "Two tunings" not in three and "deg [" in three and "more worlds and tunings can" in three
 
 
+def test_worlds_that_another_tuning_does_not_lose_are_told() -> None:
+    def tuned(*swings: int) -> str:
+        rows = [[row("feedforward/default", 4.0)], [row("a/tuned", 1.0 + k, swings=n) for k, n in enumerate(swings)]]
+        rows.append([row("bb/tuned", 1.3) for _ in swings])
+        return told(tuned_ranking("bench", FAMILIES["bench"], rows, [0, len(swings) - 1, 0]))
+
+    assert "a in bench 40 of 40, with another tuning 0." in tuned(0, 40)
+    assert "a in bench 3 of 40, with another tuning 30." in tuned(30, 4, 3)
+    assert "another tuning" not in tuned(1, 3) and "another tuning" not in tuned(40, 40)
+
+
+def test_conditions_that_no_question_parts_have_a_line_each() -> None:
+    rows = row("a/x", 1.0), row("bb/x", 2.0)
+    table = decision_table([ranked(*rows), ranked(*rows)], {"a/x": "a", "bb/x": "bb"})
+    assert table.columns[0] == "condition" and [line[:2] for line in table.rows] == [("bench", "a")] * 2
+
+
 def test_every_controller_that_must_not_be_used_is_named_and_counted_by_its_worst_fault() -> None:
     rows = [row(f"{name}/tuned", 1.0, swings=count) for name, count in (("a", 2), ("b", 7), ("d", 1))]
     found = ranked(*rows, row("e/tuned", 1.0, swings=3, failed=2), row("ff/tuned", 2.0))

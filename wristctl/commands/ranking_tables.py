@@ -164,13 +164,15 @@ _QUESTIONS = {
 def decision_table(rankings: Sequence[Ranking], names: Mapping[str, str], title: str = "") -> Table:
     """Questions whose answers part the conditions, and for each answer what to use, its RMSE and the next.
 
-    Of conditions that no question parts the last one stands for all.
+    Of conditions that a question leaves together the last one stands for all; where none parts any, each has its line.
     """
     ends = _parted(rankings, {})
     asked = [trait for trait in _QUESTIONS if any(trait in answers for answers, _ in ends)]
-    heads = (*(_QUESTIONS[trait] for trait in asked), "use", "RMSE [deg], 95 %", "as good", "next, times more")
+    heads = ("use", "RMSE [deg], 95 %", "as good", "next, times more")
     rows = [(*(answers.get(trait, "-") for trait in asked), *_leaf(one, rankings, names)) for answers, one in ends]
-    return Table(title, heads, rows)
+    if len(rankings) > 1 and not asked:
+        return Table(title, ("condition", *heads), [(condition(one), *_leaf(one, rankings, names)) for one in rankings])
+    return Table(title, (*(_QUESTIONS[trait] for trait in asked), *heads), rows)
 
 
 def _parted(rankings: Sequence[Ranking], answers: dict[str, str]) -> list[tuple[dict[str, str], Ranking]]:

@@ -82,13 +82,15 @@ def readme(manifest: Manifest, summary: str) -> str:
         for column in output.columns:
             unit = f" [{column.unit}]" if column.unit else ""
             lines.append(f"  - `{column.name}`{unit}" + f": {column.meaning}" * bool(column.meaning))
+    again = f"wristctl {command_of(manifest.kind)} --config {manifest.id}/{CONFIG}"
+    going_on = bool(units) and manifest.state == "interrupted"
     lines += [
         "",
         "## Repeat and check",
         "",
+        *[f"- on from here, from the folder above: `{again} --resume {manifest.id}`"] * going_on,
         f"- again, with a verdict on each file: `wristctl runs replay {manifest.id}`",
-        "- again as a new run, from the folder above: "
-        f"`wristctl {command_of(manifest.kind)} --config {manifest.id}/{CONFIG}`",
+        f"- again as a new run, from the folder above: `{again}`",
         f"- result hash: `{manifest.result_sha256}`",
         f"- unchanged since: `sha256sum -c {SUMS}`",
         f"- code, machine, hashes: `{MANIFEST}`; packages: `{PACKAGES}`"

@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
 from wristctl.comparison.bootstrap import plain
 from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS, HALVES
+from wristctl.comparison.tie_groups import share
 from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
+
+# Share of the worlds by which tunings of a controller differ in those that they lose where that is told; so many.
+_OTHERWISE, _NAMED = 0.1, 3
 
 
 def answer_of(
@@ -34,12 +40,35 @@ def answer_of(
         bending,
         terms_table(terms) if terms else "",
         not_to_use(rankings, names),
+        lost_otherwise(rankings),
         f"{certainty(rankings)} {few_tunings(rankings)}".strip(),
         first_again(rankings),
         decided(rankings),
         tuned_otherwise(shifts),
     ]
     return Answer(advice(rankings), decision_table(rankings, names), more=more).fitted(notes)
+
+
+def lost_otherwise(rankings: Sequence[TunedRanking]) -> str:
+    """Of which controllers the published gains are lost in other worlds than those of another tuning; the worst three.
+
+    A row's RMSE is over its tunings, and its failures and swings are of the published gains alone.
+    """
+    found = []
+    for ranking in rankings:
+        for row, tunings in enumerate(ranking.tunings):
+            lost = [int(share(~np.isfinite(one.rmse) | one.swings).times) for one in tunings]
+            own = lost.pop(ranking.published[row])
+            other = max(lost, key=lambda times: abs(times - own), default=own)
+            if abs(other - own) > _OTHERWISE * ranking.count:
+                name = ranking.labels[row].split("/")[0]
+                words = f"{name} in {condition(ranking)} {own} of {ranking.count}, with another tuning {other}"
+                found.append((abs(other - own) / ranking.count, words))
+    if not found:
+        return ""
+    worst = [words for _, words in sorted(found, key=lambda one: -one[0])[:_NAMED]]
+    more = f"; and {len(found) - _NAMED} more" * (len(found) > _NAMED)
+    return f"An RMSE is over all tunings, worlds lost are those of the published gains: {'; '.join(worst)}{more}."
 
 
 def few_tunings(rankings: Sequence[TunedRanking]) -> str:
