@@ -118,6 +118,17 @@ def test_the_library_is_sealed_into_the_run_by_its_hash_and_replays_from_there(t
     assert again.metrics["rmse"] == done.metrics["rmse"]
 
 
+@pytest.mark.parametrize(("period", "warned"), [(0.005, False), (0.01, True)])
+def test_a_loop_with_another_period_than_the_librarys_is_warned_of(
+    tmp_path: Path, period: float, warned: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    spring(tmp_path, 1, 0).rename(tmp_path / "spring.so")
+    (tmp_path / "mine.py").write_text(MINE.format("spring"))
+    with elsewhere(tmp_path):
+        face.simulate(controller=f"{tmp_path}/mine.py:MINE", horizon=0.1, loop={"control_period": period})
+    assert ("written for control periods of 5 ms, and runs every 10 ms" in caplog.text) == warned
+
+
 def test_what_is_no_such_library_is_refused_by_its_name(tmp_path: Path) -> None:
     library = spring(tmp_path, 1, 0)
     with pytest.raises(UserError, match="no controller other in the library"):

@@ -19,7 +19,8 @@ log = logging.getLogger(__name__)
 def warn_of_plain(procedure: Procedure[Any], study: Study) -> None:
     """Say for each controller in plain Python how many cases it has, how long they take, and which loops are left out.
 
-    UserError where a comparison leaves none of its loops to it.
+    Loops with another control period than it was written for are told too. UserError where a comparison leaves none of
+    its loops to it.
     """
     from wristctl.control.law import Controller
     from wristctl.control.table import CONTROLLERS
@@ -32,6 +33,20 @@ def warn_of_plain(procedure: Procedure[Any], study: Study) -> None:
         if isinstance(law, Controller) and law.plain:
             remark = _cost(procedure, study, law) if procedure.size else "its control steps take Python's time"
             log.warning("%s is plain Python: %s", name, remark)
+            if others := _other_periods(procedure, study, law):
+                own, here = (f"{1e3 * each:g}" for each in (law.period or 0.0, others[0]))
+                said = "%s was written for control periods of %s ms, and runs every %s ms here: its own time is another"
+                log.warning(said, name, own, here)
+
+
+def _other_periods(procedure: Procedure[Any], study: Study, law: Controller) -> list[float]:
+    """Control periods of the loops that it runs in which are not its own [s]."""
+    if law.period is None:
+        return []
+    section = procedure.section(study)
+    loops = procedure.size(_alone(procedure.kind, study, law)[0]).loops if procedure.size else [section]
+    periods = {getattr(loop, "control_period", law.period) for loop in loops}
+    return sorted(period for period in periods if abs(period - law.period) > 1e-9)
 
 
 def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:

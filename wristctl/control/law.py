@@ -155,6 +155,8 @@ class Controller:
     surface: Surface | None = None
     """Surface of the sliding laws, for where their rate is that of the error."""
     plain: bool = False
+    period: float | None = None
+    """Control period that it was written for [s]; None: it goes by that of its loop."""
     planes: int = 1
     """1 for a law that runs once for each plane, 2 for one that sees all planes at once."""
     learning: int = 1

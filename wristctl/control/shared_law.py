@@ -31,7 +31,7 @@ def shared_law(file: Path, name: str) -> Controller:
     A library of one plane serves each plane by itself; one of two has both. What it reads: bend and rate of each plane
     [rad, rad/s], and for each plane angle, rate and acceleration of the reference, now and in each period of its
     preview. It answers with the torque wanted in each plane [N m]. Its gains are its own constants, and its control
-    period must be that of the loop. Raises UserError for what is no such library.
+    period should be that of the loop: of another it is warned. Raises UserError for what is no such library.
     """
     try:
         library = ctypes.CDLL(str(file))
@@ -82,4 +82,5 @@ def shared_law(file: Path, name: str) -> Controller:
         planes=planes,
         preview=preview,
         plain=True,
+        period=period.value,
     )
