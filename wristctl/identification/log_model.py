@@ -21,6 +21,9 @@ from wristctl.wrist.tendon_layout import TendonLayout
 
 # Samples that are kept of all trials, shortest time between two [s], fewest of a trial, and blocks of each part.
 _MOST, _SHORTEST, _FEWEST, _BLOCKS = 800, 5e-3, 20, 8
+# Time between two samples [s] beyond which other trials do not make those of a trial fewer: a model that is followed in
+# longer steps takes other inertia and damping for the same motion.
+_OFTEN = 0.025
 # Time between two samples of a log without times [s]; nothing that depends on time is found of it.
 _NO_TIME = 1.0
 # Trials from which whole ones are predicted; of fewer parts of each.
@@ -317,7 +320,8 @@ def _recording(
         read = [clock[column] for column in seen.T]
         begin, end = max(times[0] for times in read), min(times[-1] for times in read)
         # Even readings are taken as they are: lines between them would make a quick motion smaller than the spools'.
-        shortest = max(_SHORTEST, (end - begin) / most, *(float(np.median(np.diff(times))) for times in read))
+        step = min((end - begin) / most, max(_OFTEN, (end - begin) / _MOST))
+        shortest = max(_SHORTEST, step, *(float(np.median(np.diff(times))) for times in read))
         time, step = np.linspace(begin, end, 1 + round((end - begin) / shortest), retstep=True)
         pause = np.full(len(time), step)
         columns = lines_at(time, clock, motion), lines_at(time, clock, spools), lines_at(time, clock, tensions)
