@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 import wristctl
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import found_in, identified, with_found
-from wristctl.commands.perform import Prepared, prepare
+from wristctl.commands.perform import Prepared, prepare, study_with
 from wristctl.commands.procedure import procedure_named
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
@@ -141,3 +142,31 @@ def test_an_identification_that_refused_is_named(tmp_path: Path) -> None:
         pass
     with pytest.raises(UserError, match="wrist"):
         prepared("simulate", open_run(str(run.path)))
+
+
+@pytest.mark.parametrize("settings", [{}, {"seed": 3}])
+@pytest.mark.parametrize("given", ["wrist.damping=0.2", "wrist.tendon_radius=0.019"])
+def test_overrides_of_a_study_in_python_win_over_what_a_log_tells_as_settings_do(
+    given: str, settings: dict[str, Any], tmp_path: Path
+) -> None:
+    run, (name, value) = log_run(tmp_path), given.removeprefix("wrist.").split("=")
+    loaded = wristctl.load_study(None, STIFF, given)
+    whole, origins = study_with(loaded, "simulate", settings)
+    there = prepare(procedure_named("simulate"), whole, tmp_path, {"from_identified": run}, origins=origins)
+    found = identified(there.study, "simulate", there.inputs).wrist
+    assert getattr(found, name) == float(value)
+    by_option = known("simulate", run, given).wrist
+    assert found == by_option
+    of_file = tmp_path / "mine.yaml"
+    of_file.write_text(f"wrist: {{stiffness: 1.1, {name}: {value}}}\n")
+    whole, origins = study_with(wristctl.load_study(of_file), "simulate", settings)
+    there = prepare(procedure_named("simulate"), whole, tmp_path, {"from_identified": run}, origins=origins)
+    assert getattr(identified(there.study, "simulate", there.inputs).wrist, name) != float(value)
+
+
+def test_where_keys_are_from_is_no_part_of_what_a_study_is(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("wrist: {damping: 0.2}\n")
+    by_file, by_override = wristctl.load_study(file), wristctl.load_study(None, "wrist.damping=0.2")
+    assert by_file == by_override
+    assert ("wrist", "damping") in pickle.loads(pickle.dumps(by_override)).overrides and not by_file.overrides

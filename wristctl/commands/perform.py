@@ -208,11 +208,12 @@ def study_with(
     Sizes that cannot well be meant are refused in a file and in settings; those of a study are meant.
     """
     base, files = (study, []) if isinstance(study, Study) else (None, [Path(study)] if study is not None else [])
+    overrides = base.overrides if base is not None else {}
     if base is not None and not settings:
-        return base, {}
+        return base, overrides
     whole, origins = read_study(files, command=command, keywords=settings, base=base)
     check_all_sizes(whole, origins, command)
-    return whole, origins
+    return whole, {**overrides, **origins}
 
 
 def carry_out(

@@ -1,8 +1,10 @@
 """A study: the wrist and what each command does with it. One file may hold one section or all of them."""
 
 import re
+from collections.abc import Mapping
+from typing import Any, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, PrivateAttr, field_validator
 from pydantic_core import PydanticCustomError
 
 from wristctl.config.audit import AuditSettings
@@ -20,6 +22,13 @@ from wristctl.config.section import Section
 from wristctl.config.simulate import AnalyseSettings, SimulateSettings
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
+
+
+class Origins(dict[tuple[str | int, ...], Any]):
+    """Where keys of a study are from, by their paths; two studies are equal whichever these are."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Origins)
 
 
 class Study(Section):
@@ -57,6 +66,18 @@ class Study(Section):
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
     track: TrackSettings = TrackSettings()
     hw_run: HwRunSettings = Field(HwRunSettings(), alias="hw-run")
+    _overrides: Origins = PrivateAttr(default_factory=Origins)
+
+    @property
+    def overrides(self) -> Mapping[tuple[str | int, ...], Any]:
+        """Which keys were given beside files to `load_study`, which wins over what an identification tells."""
+        return self._overrides
+
+    def given_by(self, overrides: Mapping[tuple[str | int, ...], Any]) -> Self:
+        """The study with these keys as given beside its files."""
+        given = self.model_copy()
+        given._overrides = Origins(overrides)
+        return given
 
     @field_validator("families")
     @classmethod

@@ -61,7 +61,7 @@ def load_study(
             check_sizes(study, origins)
         if trust_code:
             check_trust(tuple(name for _, name in named_by(study)))
-    return study
+    return study.given_by({path: where for path, where in origins.items() if isinstance(where, Setting)})
 
 
 def read_study(
