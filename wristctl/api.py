@@ -81,11 +81,10 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
     """The study of a YAML file, of an experiment by its name ("quick"), or of defaults only.
 
     `overrides` such as "wrist.length=0.09" win over the file and over what `from_identified` tells, later ones over
-    earlier ones; quantities are in the units that `wristctl COMMAND --dry-run --all` shows: SI, but for suffixes like _deg. Raises UserError for an
-    unknown key or a value that cannot be, with file and line, and what was meant; and, but for `force`, for a size that
-    cannot well be meant, as a length in millimetres. Parameters of an identified run take the place of a study's, as of
-    a file's; what is to win over them is given to the command: `simulate(study, wrist={"damping": 0.2})`. `trust_code`
-    lets the code run that a run carries.
+    earlier ones; quantities are in the units that `wristctl COMMAND --dry-run --all` shows: SI, but for suffixes like
+    _deg. Raises UserError for an unknown key or a value that cannot be, with file and line, and what was meant; and,
+    but for `force`, for a size that cannot well be meant, as a length in millimetres. `trust_code` lets the code run
+    that a run carries.
     """
     if others := [given for given in (file, *overrides) if not isinstance(given, str | Path | None)]:
         what = f"a {type(others[0]).__name__} is neither a file nor an override"
