@@ -170,3 +170,16 @@ def test_where_keys_are_from_is_no_part_of_what_a_study_is(tmp_path: Path) -> No
     by_file, by_override = wristctl.load_study(file), wristctl.load_study(None, "wrist.damping=0.2")
     assert by_file == by_override
     assert ("wrist", "damping") in pickle.loads(pickle.dumps(by_override)).overrides and not by_file.overrides
+
+
+@pytest.mark.parametrize(
+    ("rate", "settings", "said"),
+    [(100.0, (), True), (60.0, (), False), (100.0, ("bench.camera.frame_rate=100",), False), (50.0, (), True)],
+)
+def test_an_emulated_rig_says_that_its_camera_is_not_the_identified_one(
+    rate: float, settings: tuple[str, ...], said: bool, tmp_path: Path
+) -> None:
+    there = prepared("hw-run", log_run(tmp_path, rate), *settings)
+    plan = there.plan()
+    assert (f"bench.camera.frame_rate={rate:g}" in plan) == said
+    assert ("60 frames" in plan) == said and "camera_2" not in plan

@@ -48,7 +48,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.controllers.{number}"):
             check_row(row, tuned)
-    known = identified(study, "hw-run", inputs).wrist
+    found = identified(study, "hw-run", inputs)
+    known = found.wrist
     with under("hw-run"):
         check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
         if settings.planes == 1 and not settings.reference.is_live:
@@ -68,7 +69,23 @@ def plan(study: Study, inputs: Inputs) -> str:
         motions = len(motions_of(settings))
     count = len(settings.rows) * motions * settings.repetitions * pushes
     trial_seconds = settings.horizon + settings.back + settings.rest
-    return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
+    rig = "\n".join([describe_rig(settings), *_keeps_its_camera(found.hw_run)])
+    return f"{rig}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
+
+
+def _keeps_its_camera(believed: HwRunSettings) -> list[str]:
+    """What to say of an emulated rig whose camera has other frames than that which was identified."""
+    if believed.from_identified is None or believed.port is not None or believed.rig is not None:
+        return []
+    rate, own = believed.sensor.frame_rate, believed.bench.camera.frame_rate
+    if math.isclose(rate, own, rel_tol=0.01):
+        return []
+    cameras = ["bench.camera"] + ["bench.camera_2"] * (believed.planes == 2)
+    settings = " ".join(f"--set {camera}.frame_rate={rate:.4g}" for camera in cameras)
+    return [
+        f"the emulated rig is not the identified one: its camera has {own:.4g} frames a second, and controllers "
+        f"believe in the {rate:.4g} that were identified; {settings} gives it those"
+    ]
 
 
 def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> None:
@@ -103,6 +120,8 @@ def hw_run(session: Session) -> Performed:
     study, bench = session.study, session.study.wrist
     identified_session = replace(session, study=identified(study, "hw-run", session.inputs))
     believed = identified_session.study.hw_run
+    for kept in _keeps_its_camera(believed):
+        session.operator.tell(kept)
     planes = 2 if believed.planes == 2 and has_path(believed) else 1  # of a network: two of a path
     network = network_for(session.inputs, identified_session.study.wrist, [believed.loop], planes)
     tuned = tuned_gains(session.inputs)
