@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from wristctl.commands.quantities import told_table
 from wristctl.commands.validate.answer import (
@@ -18,7 +19,7 @@ from wristctl.commands.validate.answer import (
     validated_answer,
     wanted_terms,
 )
-from wristctl.commands.validate.figures import motion
+from wristctl.commands.validate.figures import left_over, motion
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.prediction_scores import Score
 from wristctl.identification.real_robots import RealRobot
@@ -168,3 +169,22 @@ def test_the_figure_of_a_motion_has_the_bends_that_move_and_no_line_over_what_wa
     drawn = np.asarray(line.get_ydata())
     assert list(np.flatnonzero(np.isnan(drawn))) == [2, 5], "a gap where samples between were fitted"
     np.testing.assert_array_equal(drawn[~np.isnan(drawn)], 2.0 * (measured[asked, 1 - still] + 0.5))
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_the_figure_of_what_is_left_has_each_error_at_the_number_of_its_sample_and_counts_all_recordings(
+    count: int,
+) -> None:
+    asked = np.array([True, True, False, False, True, True, False, True])
+    recordings = [SimpleNamespace(asked=asked, name=f"t{k}", time=0.5 * np.arange(8.0)) for k in range(count)]
+    fit: Any = SimpleNamespace(recordings=recordings, errors=[np.full((8, 2), [3.0 + k, 0.0]) for k in range(count)])
+    of_bends: Any = SimpleNamespace(scale=2.0, unit="deg", centred=False)
+    left, right = left_over(of_bends, [fit]).axes
+    *points, line = left.lines
+    drawn = min(count, 3)
+    assert len(points) == drawn
+    for k, of_recording in enumerate(points):
+        np.testing.assert_array_equal(np.asarray(of_recording.get_xdata()), 8 * k + np.flatnonzero(asked))
+    root = 2.0 * np.sqrt(np.mean((3.0 + np.arange(count)) ** 2))
+    assert np.asarray(line.get_ydata())[0] == pytest.approx(root)
+    assert sum(bar.get_width() for bar in right.patches if isinstance(bar, Rectangle)) == 5 * count

@@ -17,8 +17,7 @@ _SHOWN = 3
 
 def _parts(fits: Sequence[ArcFit]) -> list[tuple[ArcFit, int]]:
     """Fits with the number of a recording in which something is predicted."""
-    parts = [(fit, k) for fit in fits for k, recording in enumerate(fit.recordings) if recording.asked.any()]
-    return parts[:_SHOWN]
+    return [(fit, k) for fit in fits for k, recording in enumerate(fit.recordings) if recording.asked.any()]
 
 
 def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
@@ -27,7 +26,7 @@ def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
     Recordings without times have their samples' numbers there. A coordinate that never moves, as the second bend of a
     log in one plane, is not drawn.
     """
-    parts = _parts(fits)
+    parts = _parts(fits)[:_SHOWN]
     names = ("y", "z") if robot.robot.measured == "bend" else ("x", "y", "z")
     moving = np.any([np.ptp(fit.recordings[k].measured, axis=0) > 0.0 for fit, k in parts], axis=0)
     axes_of = [(name, at) for at, name in enumerate(names) if moving[at]]
@@ -52,23 +51,28 @@ def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
 
 
 def left_over(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
-    """Length of the error of each predicted sample [deg or mm], and its distribution."""
+    """Length of the error of each predicted sample [deg or mm], and its distribution.
+
+    Samples stand at their numbers among all that were measured of the drawn recordings, as in the order of `motion`:
+    where others were fitted there is a gap. The line and the distribution are of what is predicted in all recordings.
+    """
     picture, ((left, right),) = figure(1, 2, height=3.2, width_ratios=(2, 1))
     whole, first = [], 0
-    for fit, k in _parts(fits):
+    for number, (fit, k) in enumerate(_parts(fits)):
         recording, wrong = fit.recordings[k], fit.errors[k][fit.recordings[k].asked]
         if robot.centred:
             wrong = wrong - wrong.mean(axis=0)
         sizes = robot.scale * np.sqrt(np.sum(wrong**2, axis=1))
-        left.plot(first + np.arange(len(sizes)), sizes, ".", markersize=2.5, label=recording.name)
         whole.append(sizes)
-        first += len(sizes)
+        if number < _SHOWN:
+            left.plot(first + np.flatnonzero(recording.asked), sizes, ".", markersize=2.5, label=recording.name)
+            first += len(recording.time)
     sizes = np.concatenate(whole)
     right.hist(sizes, bins=40, color=GREY, orientation="horizontal")
     for panel in (left, right):
         panel.axhline(float(np.sqrt(np.mean(sizes**2))), color=BLACK, linewidth=0.8)
-    left.set(xlabel="predicted sample", ylabel=f"error [{robot.unit}]")
-    right.set_xlabel("samples")
+    left.set(xlabel="measured sample", ylabel=f"error [{robot.unit}]")
+    right.set_xlabel("predicted samples")
     title(right, "line: root mean square")
     return picture
 
