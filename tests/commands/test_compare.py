@@ -24,6 +24,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.controller_ranking import traits_of
 from wristctl.comparison.repetition_spread import spread
 from wristctl.comparison.step_cost import StepTime
+from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
 from wristctl.errors import UserError
 from wristctl.records.manifest import read_overview
@@ -271,6 +272,19 @@ def test_gains_that_a_search_of_the_comparison_itself_finds_are_not_asked_for() 
     assert planned[0].startswith("a search first: ") and planned[1].endswith("rollouts of 5 s")
     with pytest.raises(UserError, match="no tuned gains of smc"):
         COMPARE.plan(other, Inputs())
+
+
+@pytest.mark.parametrize("rows", ["[pid-ff, adrc]", "[smc/printed]", "[pid/tuned]"])
+def test_a_search_whose_gains_no_row_has_is_refused(rows: str) -> None:
+    """Its budget would be spent, and nothing of what it finds compared."""
+    search = "inverses: [none], tuning: {controllers: [smc], candidates: 8}"
+    unused = wristctl.load_study(None, f"compare={{controllers: {rows}, {search}}}")
+    tuned: Any = SimpleNamespace(study=unused, gains={"pid": PID.presets["printed"]}, run=None)
+    with pytest.raises(UserError, match="gains of smc would be searched") as refused:
+        COMPARE.plan(unused, Inputs({"tuned": tuned}))
+    assert refused.value.where == "compare.tuning" and "--tune" in refused.value.fix
+    used = wristctl.load_study(None, f"compare={{controllers: [feedforward, smc/tuned], {search}}}")
+    assert COMPARE.plan(used, Inputs()).startswith("a search first: ")
 
 
 def test_units_of_the_table_are_those_of_the_metrics(compare: Compare, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from wristctl.commands.inputs_of_loops import (
     with_what_there_is,
 )
 from wristctl.commands.loop_warnings import warn_of_earlier_families, warn_of_loops, warn_of_lost
+from wristctl.commands.printed_table import joined
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -155,6 +156,10 @@ def plan(study: Study, inputs: Inputs) -> str:
         with under("compare.tuning"):
             first = study.model_copy(update={"tune": settings.tuning})
             searched = f"a search first: {planned_search(first, inputs)}\n"
+        if not any(row.gains == "tuned" and row.controller in found_here for row in settings.rows):
+            what, one = f"gains of {joined(found_here)} would be searched, and no row has them", found_here[0]
+            fix = f"gains: tuned in the row of {one}, or `wristctl compare {one} --tune`"
+            raise UserError(what, "compare.tuning", fix)
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
