@@ -57,6 +57,17 @@ def hard(seed: int = 0, scale: float = 1.0, spread: float = 0.05) -> Array:
     return ordinary * scale * np.exp(np.random.default_rng(seed).normal(0.0, spread, WORLDS))
 
 
+def test_overlapping_intervals_of_rows_that_are_told_apart_are_explained_and_others_not() -> None:
+    """Worlds differ by far more than rows in one world do: which row errs less is plain in pairs alone."""
+    alike = made_up(row("a/x", hard(1, 0.3, 0.01)), row("b/x", hard(2, 0.32, 0.01)))
+    first, second = alike.standing.groups[0][0], alike.standing.groups[1][0]
+    assert alike.means[second].low < alike.means[first].high and "in pairs on the same worlds" in told(alike)
+    tied = made_up(row("a/x", hard(1, 0.1, 0.01)), row("b/x", hard(2, 0.1, 0.01)))
+    far = made_up(row("a/x", hard(1, 0.1, 0.01)), row("b/x", hard(2, 0.4, 0.01)))
+    for other in (tied, far):
+        assert "in pairs" not in told(other)
+
+
 def test_rows_that_worlds_cannot_tell_apart_are_one_group_and_others_are_not() -> None:
     found = made_up(row("a/x", hard(1, 0.3)), row("b/x", hard(2, 0.301)), row("c/x", hard(3, 0.5)))
     names = [[found.rows[at].label for at in group] for group in found.standing.groups]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 
 from wristctl.commands.printed_table import degrees, joined, two
 from wristctl.comparison.combinations import class_of
@@ -316,6 +317,16 @@ def certainty(rankings: Sequence[Ranking]) -> str:
     ends = [f"{two(100.0 * (floor - 1.0))} %" if floor < 2.0 else f"a factor of {two(floor)}" for floor in floors]
     size = ends[0] if ends[0] == ends[-1] else f"{ends[0]} to {ends[-1]}, by condition,"
     return f"RMSE that differ by less than {size} cannot be told apart with 95 %; {rankings[0].more} can."
+
+
+def paired(rankings: Sequence[Ranking]) -> str:
+    """Why a row may be told from the best although their intervals overlap; empty where no row of these is."""
+    for ranking in rankings:
+        best = winner(ranking, rankings)
+        told = chain.from_iterable(ranking.standing.groups[1:])
+        if best is not None and any(ranking.means[row].low <= ranking.means[best].high for row in told):
+            return f"Rows are compared in pairs on the same {ranking.unit}s: some differ whose intervals overlap."
+    return ""
 
 
 def decided(rankings: Sequence[Ranking]) -> str:

@@ -25,6 +25,7 @@ from wristctl.commands.ranking_answer import (
     names_of,
     not_to_use,
     open_loop,
+    paired,
     recommended,
     winner,
 )
@@ -63,6 +64,8 @@ def answer_of(
         gains = {short.get(label, label): values for label, values in (gains or {}).items()}
         asked = [short.get(label, label) for label in asked]
     names = names_of(rankings)
+    table = controllers_table(rankings, names, asked)
+    intervals = any("[" in str(cell) for row in table.rows for cell in row)
     more = rest("Every rank and figure", run)
     notes = [
         bending,
@@ -72,11 +75,11 @@ def answer_of(
         gains_of_best(rankings, gains or {}),
         papers(rankings),
         papers_order(rankings),
-        f"{certainty(rankings)} {decided(rankings)}".strip(),
+        " ".join(filter(None, [certainty(rankings), paired(rankings) * intervals, decided(rankings)])),
         gains_meant(rankings),
         "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist)." * (not own_wrist),
     ]
-    return Answer(advice(rankings), controllers_table(rankings, names, asked), more=more).fitted(notes)
+    return Answer(advice(rankings), table, more=more).fitted(notes)
 
 
 def given_names(labels: Sequence[str]) -> dict[str, str]:
