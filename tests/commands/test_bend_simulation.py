@@ -69,6 +69,16 @@ def test_the_result_says_where_its_motion_is_whether_in_one_plane_or_in_two() ->
     assert list(bends.courses()) == ["bends"] and list(planar.courses()) == ["trajectory"]
 
 
+def test_a_tip_that_is_off_beside_a_small_error_is_explained_and_segments_and_weight_are_why() -> None:
+    circle = "simulate.reference={kind: circle}"
+    several, one = simulated(circle), simulated(circle, "simulate.loop.plant_segments=1")
+    weightless = simulated(circle, "wrist.gravity=[0, 0]")
+    assert several.metrics["rmse"] < 1e-3 and several.metrics["tip_rmse_mm"] > 0.05
+    assert max(one.metrics["tip_rmse_mm"], weightless.metrics["tip_rmse_mm"]) < 0.3 * several.metrics["tip_rmse_mm"]
+    said, even = " ".join(several.summary), " ".join(one.summary)
+    assert "bend unevenly" in said and "under their weight" in said and "unevenly" not in even
+
+
 def test_what_a_motion_in_two_planes_had_under_other_names_is_found_under_them() -> None:
     course = simulated("simulate.reference.kind=circle").trajectory
     assert course.pulls is course.tension and course.coordinates is course.segment_theta  # type: ignore[attr-defined]

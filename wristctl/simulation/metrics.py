@@ -254,13 +254,13 @@ RMSE_DESIRED = Metric(
 )
 TIP_RMSE = Metric(
     "mm",
-    "RMSE of the tip's distance from the wanted position",
+    "RMS distance of the tip from that of one arc bent as wanted; several segments bend unevenly under their weight",
     of_trajectory=lambda course: 1e3 * np.sqrt(np.mean(course.tip_distance**2)),
     floor=0.02,
 )
 TIP_STEADY = Metric(
     "mm",
-    "mean distance of the tip from the wanted position over the last 10 %",
+    "mean distance of the tip from that of one arc bent as wanted, over the last 10 %",
     of_trajectory=lambda course: 1e3 * course.tip_distance[-max(1, len(course.time) // 10) :].mean(),
     floor=0.02,
 )

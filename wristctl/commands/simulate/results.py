@@ -143,6 +143,11 @@ _WORDS = {
     "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip to that of one arc",
     "saturation": "share of time out of reach",
 }  # fmt: skip
+# Why the tip is off where the error is small.
+_UNEVEN = (
+    "One arc's tip is that of a wrist that bends evenly, as wanted. Several segments bend unevenly, above all under "
+    "their weight, so that the tip is off it however small the error."
+)
 # Overshoot [%] from which it is told.
 _OVERSHOOT = 0.5
 
@@ -173,7 +178,8 @@ def answer(
     median = f" Figures are medians of {count} repetitions{'' if count >= FEWEST else few}." * (count > 1)
     sentence = f"{motion} on {place}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
     table = _table(repeated) if two or count > 1 else None
-    return Answer(sentence, table, advice, rest("All metrics, the motion and its figures", run))
+    notes = [_UNEVEN] * (two and chosen.loop.plant_segments > 1 and not repeated.first.failed)
+    return Answer(sentence, table, [*notes, *advice], rest("All metrics, the motion and its figures", run))
 
 
 def _faults(repeated: Repeated) -> list[str]:
