@@ -47,6 +47,20 @@ def test_a_step_that_takes_long_has_lines_of_its_count(monkeypatch: pytest.Monke
     assert lines and all(line.startswith("tuning: 500 of 1000 steps, best 0.002, ") for line in lines)
 
 
+def test_that_something_compiles_is_one_line_of_a_command_however_many_steps_do(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "_FIRST_LINE", 0.05)
+    screen = io.StringIO()
+    with module.Bar(Console(file=screen, width=20), False) as bar:
+        for task in ("tuning", "testing"):
+            with bar(no_event, task, None, ""), COMPILE_TIME.counted():
+                time.sleep(0.25)
+    lines = screen.getvalue().splitlines()
+    assert lines[0] == "tuning, compiling, once" and {line.partition(",")[0] for line in lines} == {"tuning", "testing"}
+    assert len(lines) > 3 and all(line.endswith(" so far") for line in lines[1:])
+
+
 def test_lines_of_a_step_come_further_and_further_apart_up_to_five_minutes() -> None:
     waits = list(islice(module._waits(), 9))
     assert waits[:3] == [10.0, 10.0, 20.0] and waits == sorted(waits) and waits[-2:] == [300.0, 300.0]

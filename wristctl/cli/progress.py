@@ -24,6 +24,8 @@ PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "s
 
 # What goes on between two tasks, and after the last one: what was found is written.
 _BETWEEN = "writing"
+# What is said of a step instead of the time that is left.
+_COMPILING = "compiling, kept for later runs"
 # Seconds after which a step that is not over has a plain line; each line later doubles the time, up to the most.
 _FIRST_LINE, _LINE_EVERY = 10.0, 300.0
 
@@ -96,7 +98,7 @@ class Bar:
     """The one live line of a command, whose tasks follow each other; off a terminal plain lines.
 
     Its bar is the share of the whole command, as far as that can be told. Off a terminal a task that takes long has a
-    line after 10 s, 20 s, 40 s and so on.
+    line after 10 s, 20 s, 40 s and so on, of which the first that compiles says so.
     """
 
     def __init__(self, console: Console, quiet: bool) -> None:
@@ -107,7 +109,7 @@ class Bar:
             console=console, transient=True, disable=not self._live,
         )  # fmt: skip
         self._task = self._bar.add_task("", total=None)
-        self._count = Count("", None, "")
+        self._count, self._compiles_told = Count("", None, ""), False
 
     def __enter__(self) -> Self:
         return self
@@ -137,8 +139,10 @@ class Bar:
             if over.wait(wait):
                 return
             passed += wait
-            remaining = self._left() or f"{duration(passed)} so far"
-            self._console.print(f"{self._count.line()}, {remaining}", **PLAIN)
+            left = self._left()
+            if left == _COMPILING:
+                left, self._compiles_told = "" if self._compiles_told else left, True
+            self._console.print(f"{self._count.line()}, {left or f'{duration(passed)} so far'}", **PLAIN)
 
     def _show(self, count: Count) -> None:
         self._count, left = count, self._ahead.seconds_left(count)
@@ -148,11 +152,7 @@ class Bar:
             self._bar.update(self._task, total=1.0, completed=passed / (passed + left))
 
     def _left(self) -> str:
-        return (
-            "compiling, kept for later runs"
-            if COMPILE_TIME.goes_on
-            else left_words(self._ahead.seconds_left(self._count))
-        )
+        return _COMPILING if COMPILE_TIME.goes_on else left_words(self._ahead.seconds_left(self._count))
 
 
 class _Left(ProgressColumn):
