@@ -89,6 +89,7 @@ def test_the_tension_that_would_have_stopped_the_trials_is_that_of_their_simulat
     peak = peak_tension(study, trials_of(study.hw_run, np.random.default_rng(0)), None, None)
     limit = max(LEAST, study.hw_run.tension_factor * peak)
     assert whole.result.tension_limit == pytest.approx(limit) and limit < study.hw_run.safety.tension
+    assert whole.result.expected_peak == pytest.approx(peak)
     assert f"more than {limit:.3g} N would stop the motors" in " ".join(str(whole.result.answer).split())
 
 

@@ -268,6 +268,9 @@ def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() 
     assert "1 of 6 trials" in " ".join(lines), "one was stopped"
     limited = " ".join(answer_of(table, _twins(0.03), {}, [], "", 31.4).lines())
     assert "more than 31.4 N" in limited and "more than" not in " ".join(lines)
+    both = " ".join(answer_of(table, _twins(0.03), {}, [], "", 31.4, 15.7).lines())
+    assert "expected peak 16 N" in both and "more than 31.4 N" in both, "each says which it is"
+    assert "expected peak" not in limited, "of a live reference none is known"
 
 
 @pytest.mark.parametrize(("simulated", "told"), [(0.02, True), (0.031, False), (0.05, False), (0.06, True)])

@@ -29,11 +29,11 @@ ROWS = 16
 
 def answer_of(
     trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str,
-    tension_limit: float = math.inf,
+    tension_limit: float = math.inf, expected_peak: float = math.inf,
 ) -> Answer:  # fmt: skip
     """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run.
 
-    A tension beyond `tension_limit` [N] would have stopped them.
+    A tension beyond `tension_limit` [N] would have stopped them; `expected_peak` [N] is what they need in simulation.
     """
     from wristctl.simulation.trajectory import rests
 
@@ -44,7 +44,7 @@ def answer_of(
     kinder = [*larger, *swings_apart(done, twins, ("simulation",))]
     kinder[-1:] = [f"{last} Do not rely on that simulation here." for last in kinder[-1:]]
     apart = [*kinder, *smaller, *swings_apart(done, twins, ("rig",))]
-    notes = [*_at_rest(done, twins, tension_limit), *apart, *unsound(trials, marks, metrics)]
+    notes = [*_at_rest(done, twins, tension_limit, expected_peak), *apart, *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     moving = {number for number, twin in twins.items() if not rests(twin.trajectory)}
@@ -153,15 +153,19 @@ def _table(trials: pd.DataFrame) -> Table:
     return table_of("", quantities([*named, *known]), groups)
 
 
-def _at_rest(done: pd.DataFrame, twins: Mapping[int, Simulation], tension_limit: float) -> list[str]:
+def _at_rest(
+    done: pd.DataFrame, twins: Mapping[int, Simulation], tension_limit: float, expected_peak: float
+) -> list[str]:
     """The largest swing at rest, where the wrist rests at all, and the largest pull, of trials that ended well."""
     if not len(done):
         return []
     swings, told = swings_of(done, twins), []
     if swings.seen.any():
         told.append(f"the wrist moves by at most {swings.largest()}")
-    stops = f" (more than {tension_limit:.3g} N would stop the motors)" if math.isfinite(tension_limit) else ""
-    told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N{stops}")
+    beside = [f"expected peak {two(expected_peak)} N"] * math.isfinite(expected_peak)
+    beside += [f"limit: more than {tension_limit:.3g} N would stop the motors"] * math.isfinite(tension_limit)
+    limits = f" ({'; '.join(beside)})" * bool(beside)
+    told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N{limits}")
     facts = "; ".join(told)
     return [f"{facts[0].upper()}{facts[1:]}."]
 

@@ -131,15 +131,16 @@ def hw_run(session: Session) -> Performed:
         warn_of_earlier_families(believed.rows)
         if swinging := outside_conditions(believed.rows, [believed.loop]):
             session.operator.dare("; ".join(swinging), "hw-run.controllers", "other gains")
-    limited_session = _limited(identified_session, network, tuned)
+    limited_session, peak = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
     most = limited_session.study.hw_run.safety.tension
-    return replace(performed(identified_session, trials, network, tuned), study=study, tension_limit=most)
+    done = performed(identified_session, trials, network, tuned)
+    return replace(done, study=study, tension_limit=most, expected_peak=peak)
 
 
-def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:
-    """The session with tension limited to what the trials need, as the person is told."""
+def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> tuple[Session, float]:
+    """The session with tension limited to what the trials need, and that [N], as the person is told."""
     import numpy as np
 
     from wristctl.trial.motion_limit import asked_at_most, borne, held_pull, limited, peak_tension, reeled_unseen
@@ -154,30 +155,30 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     if math.isfinite(peak):
         carried = f" with {study.hw_run.payload:g} kg in the hand" if study.hw_run.payload else ""
         session.operator.tell(
-            f"a tension beyond {most:.3g} N stops the motors: in simulation the trials need {peak:.2g} N{carried} "
-            f"(hw-run.tension_factor: {factor:g}, hw-run.payload)"
+            f"tension limit: {most:.3g} N, beyond which the motors stop; expected peak: {peak:.2g} N, which the trials "
+            f"need in simulation{carried} (hw-run.tension_factor: {factor:g}, hw-run.payload)"
         )
     elif study.hw_run.reference.is_live:
         session.operator.tell(
-            f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): no simulation says what a live "
-            "reference needs"
+            f"tension limit: {most:.3g} N, beyond which the motors stop (hw-run.safety.tension); expected peak: none, "
+            "as no simulation says what a live reference needs"
         )
-        return replace(session, study=changed)
+        return replace(session, study=changed), peak
     asked, motors = asked_at_most(study.hw_run, study.wrist), study.hw_run.safety.motor_pull
     if math.isfinite(peak) and peak > asked:
         share = 100.0 * peak / asked
         _dare(
             session,
-            f"in simulation the trials need {peak:.2g} N, and of motors that pull {motors:.3g} N no more than "
-            f"{asked:.2g} N is asked: the wrist stays behind, or motors slip",
+            f"expected peak: in simulation the trials need {peak:.2g} N, and of motors that pull {motors:.3g} N no "
+            f"more than {asked:.2g} N is asked: the wrist stays behind, or motors slip",
             f"a smaller motion, or drives at {share:.0f} % of their current (safety.motor_pull)",
         )
     reeled = reeled_unseen(changed.hw_run, study.wrist, network)
     pull, most = held_pull(changed.hw_run, reeled), borne(study.hw_run)
     beyond = f", beyond the {most:.0f} N that tendons are to bear (safety.tension)" if pull > most else ""
     said = (
-        f"a wrist that is held, or a motor that fails, may pull a tendon with about {pull:.0f} N{beyond}: "
-        f"spools reel in {1e3 * reeled:.1f} mm more until that is seen and they stand"
+        f"a wrist that is held, or a motor that fails, may pull a tendon with about {pull:.0f} N{beyond} before the "
+        f"motors stop: spools reel in {1e3 * reeled:.1f} mm more until that is seen and they stand"
     )
     if beyond:
         share = 100.0 * most / motors
@@ -185,7 +186,7 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         _dare(session, said, fix)
     else:
         session.operator.tell(said)
-    return replace(session, study=changed)
+    return replace(session, study=changed), peak
 
 
 def _dare(session: Session, danger: str, fix: str) -> None:

@@ -49,11 +49,14 @@ class Performed(StudyResult):
     """by the trial's number"""
     tension_limit: float = math.inf
     """Tension [N] beyond which the trials would have been stopped."""
+    expected_peak: float = math.inf
+    """Largest tension [N] that they need in simulation; infinite where none says so."""
 
     @property
     def answer(self) -> Answer:
         """Error by motion, settling and recovery, and how far simulation agrees."""
-        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place, self.tension_limit)
+        tensions = self.tension_limit, self.expected_peak
+        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place, *tensions)
 
     @property
     def marks(self) -> list[str]:
