@@ -16,6 +16,7 @@ import pytest
 import wristctl
 from wristctl.cli.app import main
 from wristctl.commands.results import StudyResult
+from wristctl.config.controller_row import Row
 from wristctl.config.study import Study
 from wristctl.control import table as gains_file
 from wristctl.errors import UserError
@@ -167,7 +168,8 @@ def test_a_network_and_gains_are_read_once_by_plan_search_and_comparison(
     search |= {"controllers": ["pid"], "scenarios": [{"loop": "fast", "reference": step}]}
     (folder.parent / "search.yaml").write_text(json.dumps({"compare": {"tuning": search}}))
     tuning = wristctl.load_study(folder.parent / "search.yaml").compare.tuning
-    compared = study.compare.model_copy(update={"tuning": tuning})
+    rows = (*study.compare.rows, Row(controller="pid", gains="tuned"))
+    compared = study.compare.model_copy(update={"tuning": tuning, "rows": rows})
     done = wristctl.compare(study.model_copy(update={"compare": compared}), network=network, tuned=tuned)
     assert sorted(read) == ["load_network", "read_gains"] and set(done.searches) == {"pid"}
 
