@@ -73,7 +73,7 @@ def read(command: list[str], seed: int) -> dict[str, Any]:
         done = subprocess.run(
             [sys.executable, "-c", code, *words], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
         )
-        if not file.exists():
+        if done.returncode not in (0, 3) or not file.exists():
             raise SystemExit(done.stderr)
         found: dict[str, Any] = json.loads(file.read_text())
         return found

@@ -75,9 +75,14 @@ def cores() -> int:
     return max(1, min(there, int(said))) if said.isdigit() else there
 
 
-def crowding() -> float:
-    """How many times longer a process takes here than alone: what ran or waited in the last minute, for each core."""
-    return max(1.0, os.getloadavg()[0] / _there())
+def crowding(passed: float, processor: float) -> float:
+    """How many times longer this process takes here than alone, as far as it has had its cores lately.
+
+    It had `processor` seconds of them in `passed` ones. It may have waited for something else, as for workers: then it
+    is no more than what ran or waited in the last minute, for each core.
+    """
+    waited = passed * cores() / processor if processor > 0.0 else float("inf")
+    return max(1.0, min(waited, os.getloadavg()[0] / _there()))
 
 
 def _there() -> int:

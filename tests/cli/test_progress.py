@@ -134,13 +134,27 @@ def test_what_follows_a_task_is_part_of_the_time_left_also_when_all_of_it_is_cou
     assert count.seconds_left() == pytest.approx(20.0 * then + after)
 
 
-@pytest.mark.parametrize(("waiting", "longer"), [(0.5, 1.0), (1.0, 1.0), (3.0, 3.0)])
-def test_seconds_that_follow_are_longer_on_a_crowded_machine(
-    waiting: float, longer: float, clock: list[float], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("waiting", "cores", "had", "longer"),
+    [
+        (0.5, 1, 5.0, 1.0),
+        (1.0, 1, 5.0, 1.0),
+        (3.0, 1, 20.0, 1.0),  # the others are of low priority
+        (3.0, 1, 10.0, 2.0),
+        (3.0, 4, 40.0, 2.0),
+        (3.0, 4, 80.0, 1.0),
+        (3.0, 1, 1.0, 3.0),
+        (3.0, 1, 0.0, 3.0),  # it waited for its workers
+    ],
+)
+def test_seconds_that_follow_are_longer_where_a_crowded_machine_kept_this_process_waiting(
+    waiting: float, cores: int, had: float, longer: float, clock: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sched_getaffinity", lambda process: range(4), raising=False)
     monkeypatch.setattr("os.getloadavg", lambda: (4.0 * waiting, 99.0, 99.0))
-    count = Count("ranking", 4, "", 4, began=0.0, after=7.0)
+    monkeypatch.setenv("OMP_NUM_THREADS", str(cores))
+    monkeypatch.setattr("time.process_time", lambda: 100.0 + had)
+    count = Count("ranking", 4, "", 4, began=0.0, processor=100.0, after=7.0)
     clock[0] = 20.0
     assert count.seconds_left() == pytest.approx(7.0 * longer)
 

@@ -35,6 +35,8 @@ class Count:
     count: int = 0
     figures: dict[str, float] = field(default_factory=dict)
     began: float = field(default_factory=lambda: time.monotonic())
+    processor: float = field(default_factory=time.process_time)
+    """Processor time of this process when it began [s]."""
     kept: int = 0
     """Part of the count that an earlier run had done, which says nothing of the pace."""
     then: float = 0.0
@@ -64,7 +66,8 @@ class Count:
         reached = passed if self.reached is None else self.reached
         following = min(count + self.step, whole)
         task = reached if count == whole else max(reached * whole / count, passed * whole / following)
-        return task * (1.0 + self.then) + self.after * crowding() - passed
+        longer = crowding(time.monotonic() - self.began, time.process_time() - self.processor)
+        return task * (1.0 + self.then) + self.after * longer - passed
 
     def remaining(self) -> str:
         """Time left in words; empty where it is unknown."""
