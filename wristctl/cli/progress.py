@@ -25,7 +25,7 @@ PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "s
 # What goes on between two tasks, and after the last one: what was found is written.
 _BETWEEN = "writing"
 # What is said of a step instead of the time that is left.
-_COMPILING = "compiling, kept for later runs"
+_COMPILING = "compiling, once"
 # Seconds after which a step that is not over has a plain line; each line later doubles the time, up to the most.
 _FIRST_LINE, _LINE_EVERY = 10.0, 300.0
 
