@@ -92,3 +92,32 @@ def test_a_link_that_is_slower_than_its_limit_is_a_stop_that_names_it(call: Call
     assert code == 5 and "the board's answers take" in err and "latency timer" in err
     (run,) = list_runs(Path("results"))
     assert run.state == "failed"
+
+
+@pytest.mark.parametrize("more", [(), ("--set", "port=/dev/ttyACM0")])
+@pytest.mark.parametrize(
+    "given", [("device.delay=0.016",), ("device.delay=0",), ("device.delay=0.016", "device.width=640")]
+)
+def test_what_an_emulated_rig_does_not_read_of_a_camera_is_named(
+    call: Call, given: tuple[str, ...], more: tuple[str, ...]
+) -> None:
+    _, out, err = call("hw-run", "--dry-run", *(part for one in given for part in ("--set", one)), *more)
+    said = " ".join((out + err).split())
+    for one in given:
+        key, value = one.split("=")
+        assert (f"{key}," in said.replace(" and ", ",")) == (not more and value != "0")
+    assert ("bench.camera.delay_frames" in said) == (not more and given != ("device.delay=0",))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [0.016, 0.008])
+def test_an_age_that_stamps_do_not_tell_is_found_and_a_device_setting_is_none_of_an_emulated_rig(
+    call: Call, monkeypatch: pytest.MonkeyPatch, size: float
+) -> None:
+    monkeypatch.setattr(rig_strokes, "COUNT", 8)
+    late = f"bench.faults=[{{kind: stamps-shifted, at: 0, since: power-on, size: {size}}}]"
+    _, out, err = call(
+        "hw", "check", "--rig", "--port", "emulated", "--yes", "--set", late, "--set", "device.delay=0.016"
+    )
+    assert _milliseconds(out, "their age beyond that, by strokes") == pytest.approx(1e3 * size, abs=2.0)
+    assert "device.delay" in err and "bench.camera.delay_frames" in err

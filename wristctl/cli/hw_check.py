@@ -133,6 +133,7 @@ def check_rig(
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
     from wristctl.commands.adoption import with_planes
+    from wristctl.commands.rig_description import unread_of_device
     from wristctl.loop_priority import prioritised
     from wristctl.records import require
     from wristctl.trial.rig_facts import Pictures, measure, troubles
@@ -148,8 +149,8 @@ def check_rig(
     view, view_2 = map(View.of, runs)
     pictures = Pictures()
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
-        if priority:
-            typer.echo(priority, err=True)
+        for said in [priority] * bool(priority) + unread_of_device(settings):
+            typer.echo(said, err=True)
         with progress(console, f"opening board and camera{'s' * (settings.planes == 2)}", quiet):
             testbed = open_testbed(settings, study.wrist, study.seed, view, lambda *_: None, pictures, view_2)
         try:
