@@ -34,6 +34,7 @@ TABLES = {
     ),
     "odd": Table(ODD, (ODD, "x"), [(ODD, 1.0), (ODD * 4, None), ("", True)]),
     "large and small": Table("S", ("a", "b [deg]"), [(1.5e12, 1e-12), (-3.0, 2.5), (123456, 0.001)]),
+    "powers": Table("P", ("a [rad/s^2]", "b [N m s^0.5]", "c [s^-1]"), [(1.5, 2.5, 3.5)]),
     "no rows": Table("None", ("a", "b"), []),
     "one long word": Table("L", ("file",), [("x" * 90,)]),
 }  # fmt: skip
@@ -56,6 +57,8 @@ def test_each_cell_holds_one_quantity() -> None:
         assert one in cells, one
     assert "swings 0.42 deg in 7 of 8" in cells, "what is no quantity stays as it is"
     assert r"ideal (8) [\unit{\degree}]" in text
+    heads = latex_table(TABLES["powers"])
+    assert all(rf"[\unit{{{unit}}}]" in heads for unit in ("rad/s^{2}", "N.m.s^{0.5}", "s^{-1}"))
 
 
 def test_every_row_has_as_many_cells_as_its_layout_has_columns() -> None:
@@ -83,14 +86,23 @@ def test_words_that_tell_rows_apart_stand_beside_every_part_of_a_table(names: tu
 def test_the_table_of_an_answer_has_its_sentence_for_a_caption(call: Call, tmp_path: Path) -> None:
     with start_run("simulate", Study(), "", tmp_path / "results") as live:
         findings = Findings(0, live)
-        findings.overview.answer[:] = ["simulate at 2 points: lowest RMSE 1 deg", "at 100 % of it.", "", "x  y"]
+        findings.overview.answer[:] = [
+            "simulate at 2 points: lowest RMSE 1 deg",
+            "at 100 % of it.",
+            "",
+            "RMSE, * best",
+            "x  y",
+        ]
         findings.keep_overview()
-        tables = [{"title": title, "columns": ["x"], "rows": [[1.0]]} for title in ("", "T")]
+        tables = [{"title": title, "columns": ["x"], "rows": [[1.0]]} for title in ("", "RMSE, * best", "T")]
         live.file(TABLES_OF_RUNS).write_text(json.dumps(tables), encoding="utf-8")
     text = call("runs", "table", "latest:simulate", "--latex")[1]
     name = live.path.name.replace("_", r"\_")
     captions = re.findall(r"caption\{(.*)\}", text)
-    assert captions == [rf"Simulate at 2 points: lowest RMSE 1 deg at 100 \% of it. Run {name}.", "T"]
+    sentence = r"Simulate at 2 points: lowest RMSE 1 deg at 100 \% of it."
+    assert captions == [
+        f"{sentence} Run {name}.", f"{sentence} RMSE, * best. Run {name}.", f"T. Run {name}."
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -141,12 +141,20 @@ def table(
         if not 1 <= position <= len(run_tables):
             raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
     positions = number or range(1, len(run_tables) + 1)
-    sentence = " ".join(takewhile(bool, read_overview(run.path).answer))  # the answer's own table has no title
+    answer = read_overview(run.path).answer
+    sentence = " ".join(takewhile(bool, answer))
     names_one = re.match(r"\S+\.py:", sentence) or re.split(r"[ /:,]", sentence)[0] in CONTROLLERS
     begins = sentence if names_one else capital(sentence)
-    caption = f"{begins} Run {run.id}." if sentence else f"{run.kind}: run {run.id}"
+
+    def caption(one: Table) -> str:
+        """Of the answer's own table, which has no title or one of its lines for it, the answer's sentence too."""
+        of_the_answer = begins if not one.title or one.title in " ".join(answer) else ""
+        title = f"{one.title}." if one.title else ""
+        said = " ".join(filter(None, (of_the_answer, title)))
+        return f"{said} Run {run.id}." if said else f"{run.kind}: run {run.id}"
+
     chosen = {f"{run.kind}-{position}": run_tables[position - 1] for position in positions}
-    texts = [latex_table(one, label, caption) if latex else one.text() for label, one in chosen.items()]
+    texts = [latex_table(one, label, caption(one)) if latex else one.text() for label, one in chosen.items()]
     print("\n\n".join(texts))
 
 

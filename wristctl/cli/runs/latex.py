@@ -21,6 +21,7 @@ _CELL = re.compile(
     rf"(?:(?P<rank>\d+): )?(?P<value>{_NUMBER})(?: \[(?P<low>{_NUMBER}), (?P<high>{_NUMBER})\])?(?: (?P<mark>[*=]))?"
 )
 _UNIT = re.compile(r"(?P<words>.*\S) \[(?P<unit>[^\[\]]+)\]")
+_POWER = re.compile(r"\\textasciicircum\{\}(-?[\d.]+)")
 _UNITS = {"deg": r"\degree", "%": r"\percent"}
 
 
@@ -57,14 +58,14 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
     label
         Name for references, without `tab:`; none where it is empty.
     caption
-        Where the table has no title.
+        In place of its title.
 
     Columns that do not fit beside the others stand below, with those that name the rows; what is still too wide is
     scaled.
     """
     heads, rows = table.cells()
     columns = [part for at, head in enumerate(heads) for part in _parted([row[at] for row in rows], head)]
-    lines = [r"\begin{table}[!t]", r"\centering", r"\footnotesize", rf"\caption{{{_text(table.title or caption)}}}"]
+    lines = [r"\begin{table}[!t]", r"\centering", r"\footnotesize", rf"\caption{{{_text(caption or table.title)}}}"]
     lines += [rf"\label{{tab:{label}}}"] * bool(label)
     for block in _blocks(columns):
         lines += [r"\resizebox{\ifdim\width>\columnwidth\columnwidth\else\width\fi}{!}{%", *_tabular(block)]
@@ -160,7 +161,7 @@ def _head(words: str) -> str:
     found = _UNIT.fullmatch(words)
     if found is None:
         return _text(words)
-    unit = _UNITS.get(found["unit"]) or _text(found["unit"].replace(" ", "."))
+    unit = _UNITS.get(found["unit"]) or _POWER.sub(r"^{\1}", _text(found["unit"].replace(" ", ".")))
     return rf"{_text(found['words'])} [\unit{{{unit}}}]"
 
 
