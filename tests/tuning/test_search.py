@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -212,13 +214,26 @@ def test_what_swings_on_a_moving_reference_is_marked_where_feedforward_swings_le
 ) -> None:
     """At rest only what is left at the end counts."""
     swings = [0.0, 1.5 * LIMIT_CYCLE, 1.5 * LIMIT_CYCLE]
-    _, found = made_up((0, 1, 2), oscillation=[0.0, 0.0, 2.0 * LIMIT_CYCLE], sustained=swings)
+    small = [0.0, 0.0, 0.0]
+    _, found = made_up(
+        (0, 1, 2), oscillation=[0.0, 0.0, 2.0 * LIMIT_CYCLE], sustained=swings, steady_state=small, rmse=small
+    )
+    cases: Any = [SimpleNamespace(motion=SimpleNamespace(bend_ref=np.ones((2, 1))))] * 3
     moving, law = replace(found, rests=np.array([True, False, True])), controller("pd-ff")
     for measured, open_loop, marks in ((moving, 0.0, 2), (moving, 1.0, 1), (found, 0.0, 1)):
         still = replace(measured, metrics={"sustained": np.full((1, 3), open_loop * LIMIT_CYCLE)})
         given = {law.name: measured, "feedforward": still}
         monkeypatch.setattr("wristctl.tuning.objective.measure", lambda law, *of, given=given: given[law.name])
-        assert marks_of(law, np.zeros(2), [], WristParameters()) == {"limit cycle": marks}
+        assert marks_of(law, np.zeros(2), cases, WristParameters()) == {"limit cycle": marks}
+
+
+def test_what_hardly_moves_stops_short_at_rest_and_on_a_motion_that_never_rests() -> None:
+    settings = ["loops={one: {}}", "horizon=2.5", "scenarios=[{loop: one, reference: {duration: 0.5}},"
+                " {loop: one, reference: {kind: sine, angle_deg: -20}}]"]  # fmt: skip
+    study, law = load_study([], settings, "tune"), controller("pid")
+    cases = tuning_cases(study)[0]
+    for gains, marks in (((1e-3, 0.0, 0.0), {"stops short": 2}), ((20.0, 50.0, 1.0), {})):
+        assert marks_of(law, np.array(gains), cases, study.wrist) == marks
 
 
 @pytest.mark.slow

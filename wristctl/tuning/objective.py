@@ -10,31 +10,39 @@ from wristctl.config.tune import Objective
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
+from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.trajectory import size_of
 from wristctl.tuning.margin import CHANGES, OwnLoop
 
 # A law without feedback, which cannot be unstable: what every gains are measured by.
 YARDSTICK = "feedforward"
 # Rollouts of changed loops that cost hardly more than one.
 _LANES_TOGETHER = 64
+# Mean size of a sine over its RMS.
+_MEAN_OF_SINE = 2.0 * np.sqrt(2.0) / np.pi
 # Decades that a case counts where the wrist left its range at its very end, and one more where it did at once.
 _FAILED = 3.0
 
 
 def marks_of(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters) -> dict[str, int]:
-    """On how many cases gains (g,) fail, swing, chatter, or do not converge, by mark; without those of none.
+    """On how many cases gains (g,) fail, stop short, swing, chatter, or do not converge, by mark without those of 0.
 
-    They swing at rest, or in motion beside feedforward (`Measured.swings_in_motion`).
+    They swing at rest, or in motion beside feedforward (`Measured.swings_in_motion`). They stop short where more than a
+    fifth of the largest reference is missing at the end, as `arrives` has it, or of one that never rests on the whole.
     """
-    metrics = ["oscillation", "sustained"]
+    metrics = ["oscillation", "sustained", "steady_state", "rmse"]
     measured = measure(law, gains[None], cases, wrist, metrics)
     cycles = measured.limit_cycles
     if not measured.rests.all():
         open_loop = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, metrics)
         cycles = cycles | measured.swings_in_motion(open_loop)
+    asked = np.array([float(np.max(size_of(case.motion.bend_ref))) for case in cases])
+    off = np.where(measured.rests, measured.metrics["steady_state"], _MEAN_OF_SINE * measured.metrics["rmse"])
     holds = {
         "failed": measured.failed,
+        "stops short": (off > SHORT * asked) & ~measured.failed,
         "limit cycle": cycles & ~measured.failed,
         "chatters": (measured.chatter > 0.0) & ~measured.failed,
         "not converged": measured.unconverged & ~measured.failed,

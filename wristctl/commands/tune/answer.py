@@ -31,6 +31,7 @@ _DIGITS = 1e-4
 # What a mark says of a case, as a verb.
 _VERBS = {
     "failed": "fails",
+    "stops short": "stops short",
     "limit cycle": "swings",
     "chatters": "chatters",
     "not converged": "depends on the integration step",
@@ -372,5 +373,5 @@ def _elsewhere(
         words = [f"{verbs} on {joined(loops)}" for verbs, loops in does.items() if loops]
         facts += [f"{name} {', '.join(words)}"] * bool(words)
     unsound = any(wrong for marks in elsewhere.values() for wrong in marks.values())
-    warned = " Do not use gains on a loop where they swing or fail." * unsound
+    warned = " Do not use gains on a loop where they swing, stop short or fail." * unsound
     return [f"The same motions on the study's other loops: {'; '.join(facts)}.{warned}"] * bool(facts)
