@@ -94,7 +94,7 @@ def test_settings_of_networks_of_tips_are_refused_before_anything_is_drawn(chang
     key = change.partition("=")[0]
     with pytest.raises(UserError) as refused:
         wristctl.train(load_study([], [*DATA, "train={hidden: [8]}", f"train.{change}"]))
-    assert refused.value.where == f"train.{key}"
+    assert refused.value.where == f"load_study(..., 'train.{change}'): train.{key}"
 
 
 def test_a_network_that_is_too_large_for_a_controller_is_refused() -> None:
