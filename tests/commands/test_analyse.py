@@ -226,6 +226,28 @@ def test_what_cannot_be_analysed_is_said_with_where(settings: tuple[str, ...], s
     assert said in str(caught.value) and caught.value.exit_code == 2
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("gains", [{"Kp": 20.0, "Ki": 0.0, "Kd": 0.5}, {"Kp": 5.0, "Ki": 0.0, "Kd": 0.3}])
+def test_a_loop_without_an_integral_rests_where_the_simulated_one_does(gains: dict[str, float]) -> None:
+    """Short of what is asked, with an integral of the error that drifts and acts on nothing."""
+    done: Any = wristctl.analyse(controller="pid", gains=gains, angles_deg=[15.0])
+    rest = math.degrees(done.found[0].linear.theta)
+    moved: Any = wristctl.simulate(controller="pid", gains=gains, reference={"angle_deg": 15.0}, horizon=6.0)
+    assert done.found[0].margins.stable and rest < 14.9
+    assert rest == pytest.approx(math.degrees(moved.course["bend"].iloc[-1]), abs=2e-3)
+
+
+@pytest.mark.slow
+def test_a_loop_far_from_stable_is_told_unstable_and_with_which_part_of_a_gain_it_would_be() -> None:
+    rig: Any = {"control_period": 0.01, "sensor": {"level": "camera"}, "actuator": {"level": "tendon"}}
+    found: Any = wristctl.analyse(
+        controller="pd-ff", gains={"Kp": 20.0, "Kd": 0.5}, loop=rig, angles_deg=[15.0], over="Kp"
+    )
+    assert found.fault is not None and "unstable at 15 deg" in found.fault.what
+    assert found.locus.least == 0.0 or found.locus.least < found.locus.most
+    assert 0.1 < found.locus.most < 1.0, "it is stable with less of the gain"
+
+
 def test_a_loop_that_rests_nowhere_is_said() -> None:
     """A reference of which tendons that only pull one way make nothing: no finite gain rests there."""
     with pytest.raises(UserError, match="rests nowhere near"):

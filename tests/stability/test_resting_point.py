@@ -22,6 +22,7 @@ class Mapped:
 
     def __init__(self, begin: float, *taken: tuple[Callable[[float], float], Callable[[float], float]]) -> None:
         self.sizes, self._begin, self._taken = np.array([SIZE]), begin, taken
+        self.names = ["angle"]
 
     def guesses(self) -> list[Array]:
         return [np.array([SIZE * self._begin])]
@@ -60,6 +61,15 @@ def test_what_changes_most_in_any_tick_counts(changes: tuple[float, float]) -> N
     state = loop.guesses()[0]
     most = max(map(abs, changes)) if all(map(math.isfinite, changes)) else math.inf
     assert change_in(loop, RestingPoint(state, loop.slopes(state))) == most
+
+
+def test_a_controllers_memory_that_drifts_and_acts_on_nothing_changes_nothing() -> None:
+    """As the integral of an error whose gain is 0; any other variable that drifts does not rest."""
+    loop: Any = Mapped(1.0, (lambda x: 2.0, lambda x: 0.0))
+    state = loop.guesses()[0]
+    assert change_in(loop, RestingPoint(state, loop.slopes(state))) == 2.0
+    loop.names = ["memory"]
+    assert resting_point(loop) is not None
 
 
 def test_all_ticks_of_a_cycle_leave_the_same_state() -> None:

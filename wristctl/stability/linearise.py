@@ -31,6 +31,8 @@ _FURTHEST = 0.3
 _FREE = 1e-10
 # Iterations that find the tendons' path at a position of the wrist.
 _TURNS = 5
+# Shares of the gains with which a loop that rests nowhere near is looked for, and by how much they are raised then.
+_WEAKER, _STRONGER = (0.5, 0.25, 0.1, 0.03), 1.25
 # Column of the first bend, which is nan where the wrist has failed.
 _BEND = 0
 
@@ -75,12 +77,56 @@ def with_relaxed_bristles(loop: LoopTicks, sliding: LoopTicks, point: RestingPoi
     return _newton(loop, RestingPoint(state, loop.slopes(state)))
 
 
+def rest_of(
+    law: Controller, gains: Sequence[float], loop: Loop, wrist: WristParameters, theta: ArrayLike
+) -> tuple[LoopTicks, RestingPoint | None]:
+    """A loop's ticks and where it rests; None where it rests nowhere near.
+
+    A loop that is far from stable runs off its course from where it is looked for. It is followed there from where the
+    same loop rests with all gains smaller, which is raised step by step.
+    """
+    ticks = LoopTicks(law, gains, loop, wrist, theta)
+    point = resting_point(ticks)
+    weaker = iter(_WEAKER if point is None else ())
+    for share in weaker:
+        point = resting_point(LoopTicks(law, _times(gains, share), loop, wrist, theta))
+        if point is None:
+            continue
+        while point is not None and share < 1.0:
+            share = min(1.0, _STRONGER * share)
+            ticks = LoopTicks(law, _times(gains, share), loop, wrist, theta)
+            rest = _newton(ticks, RestingPoint(point.state, ticks.slopes(point.state)))
+            point = rest if change_in(ticks, rest) < _STILL else None
+        break
+    return ticks, point
+
+
+def _times(gains: Sequence[float], share: float) -> list[float]:
+    return [share * gain for gain in gains]
+
+
 def change_in(loop: LoopTicks, point: RestingPoint) -> float:
-    """The largest change of any variable in any tick, in typical sizes; inf where the wrist is not where it can be."""
+    """The largest change of any variable in any tick, in typical sizes; inf where the wrist is not where it can be.
+
+    What drifts and acts on nothing, as the integral of an error whose gain is 0, is left out.
+    """
     if not all(math.isfinite(tick.recorded[_BEND]) for tick in point.ticks):
         return math.inf
-    change = max(float(np.abs((tick.after - point.state) / loop.sizes).max()) for tick in point.ticks)
+    acting = _acting(loop, point)
+    changes = [np.abs((tick.after - point.state) / loop.sizes)[acting] for tick in point.ticks]
+    change = max(float(each.max(initial=0.0)) for each in changes)
     return change if math.isfinite(change) else math.inf
+
+
+def _acting(loop: LoopTicks, point: RestingPoint) -> NDArray[np.bool_]:
+    """Which variables (x,) change another one, or anything that is recorded but themselves."""
+    memory = np.array(loop.names) == "memory"
+    others = ~np.eye(len(loop.sizes), dtype=bool)
+    acts = np.zeros(len(loop.sizes), bool)
+    for tick in point.ticks:
+        acts |= np.any((tick.transition != 0.0) & others, axis=0)
+    acting: NDArray[np.bool_] = acts | ~memory
+    return acting
 
 
 def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
@@ -92,9 +138,9 @@ def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
             best = point
         if not math.isfinite(now) or now < _ENDED:
             break
-        ticks = list({id(tick): tick for tick in point.ticks}.values())
-        change = np.concatenate([(tick.after - point.state) / sizes for tick in ticks])
-        slopes = np.concatenate([tick.transition * sizes / sizes[:, None] - identity for tick in ticks])
+        ticks, acting = list({id(tick): tick for tick in point.ticks}.values()), _acting(loop, point)
+        change = np.concatenate([((tick.after - point.state) / sizes)[acting] for tick in ticks])
+        slopes = np.concatenate([(tick.transition * sizes / sizes[:, None] - identity)[acting] for tick in ticks])
         step = np.linalg.lstsq(slopes, change, rcond=_FREE)[0]
         state = point.state - min(1.0, _FURTHEST / max(float(np.abs(step).max()), 1e-300)) * sizes * step
         if np.array_equal(state, point.state):
@@ -160,8 +206,8 @@ def linearise(
     `stuck`; what is held between ticks is held exactly, however many integration steps the loop has. Raises UserError
     for frames that are too many control periods apart.
     """
-    sliding = LoopTicks(law, gains, smooth(loop, "slipping"), wrist, theta)
-    ticks, point = sliding, resting_point(sliding)
+    sliding, point = rest_of(law, gains, smooth(loop, "slipping"), wrist, theta)
+    ticks = sliding
     if point is None:
         return None
     if friction == "stuck" and loop.actuator.winds:

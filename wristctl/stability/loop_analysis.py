@@ -99,8 +99,9 @@ At = Callable[[float], SampledLoop | None]
 class RootLocus:
     """Poles as (growth [1/s], frequency [Hz]) rows (poles, 2) at each of the factors (G,) of the gain.
 
-    `least` and `most` are the factors between which it is stable, about 1; 0 and inf where no limit was met within
-    what was looked at, nan where it is not stable at 1. `swings` are the frequencies [Hz] at these limits.
+    `least` and `most` are the factors between which it is stable, about 1 or nearest to it; 0 and inf where no limit
+    was met within what was looked at, nan where it is stable at none of them. `swings` are the frequencies [Hz] at
+    these limits.
     """
 
     over: str
@@ -117,8 +118,9 @@ def root_locus(over: str, closed: At, span: float) -> RootLocus:
     modes = [_modes(closed, float(factor)) for factor in factors]
     poles = [np.array([(mode.growth, mode.frequency) for mode in swings]).reshape(-1, 2) for swings in modes]
     stable = [bool(swings) and swings[0].growth < NEUTRAL for swings in modes]
-    middle = _POINTS // 2
-    if not stable[middle]:
+    near = sorted(range(_POINTS), key=lambda k: abs(k - _POINTS // 2))
+    middle = next((k for k in near if stable[k]), None)
+    if middle is None:
         return RootLocus(over, factors, poles, math.nan, math.nan, (math.nan, math.nan))
     low = next((k for k in range(middle, -1, -1) if not stable[k]), None)
     high = next((k for k in range(middle, _POINTS) if not stable[k]), None)

@@ -133,7 +133,7 @@ def _end(limit: LinearityLimit, side: str) -> str:
 def _mended(worst: LoopAnalysis) -> str:
     least, most = worst.margins.least, worst.margins.most
     if math.isnan(least.value):
-        return "no other loop gain makes it stable"
+        return "no other loop gain makes it stable (--over NAME tries a gain of the controller)"
     if least.value == 0.0:
         return f"it is stable up to {_three(most.value)} times the loop gain"
     above = "" if math.isinf(most.value) else f" to {_three(most.value)}"
