@@ -58,7 +58,11 @@ def test_the_answer_of_a_training_says_errors_in_motions_that_were_held_out(made
     for row in rows.values():
         after_20_ms, after_200_ms, largest = (float(value) for value in row[1:])
         assert 0.0 < after_20_ms < after_200_ms < largest < 5.0
-    assert trained.metrics["network_after_02_s"] == rows["network"][2]
+    assert trained.metrics["network_after_200_ms"] == rows["network"][2]
+    assert trained.metrics["network_after_20_ms"] == rows["network"][1]
+    meanings = {name: known["meaning"] for name, known in trained.findings.metrics.items()}
+    assert meanings["network_after_20_ms"] == "network: RMSE of the bend after 0.02 s in held-out motions"
+    assert "largest error of the bend after 0.2 s" in meanings["network_largest_then"]
     still = np.degrees(np.ptp(samples.bend[trained.held_out], axis=1)).max()
     assert math.isfinite(float(rows["network"][3])) and float(rows["network"][3]) < 0.1 * still
     assert made.moved.frame().shape == (600, 6)

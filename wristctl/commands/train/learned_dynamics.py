@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from dataclasses import dataclass
 from itertools import pairwise
@@ -33,6 +34,8 @@ CONTROLLER, NETWORK, NAME = "code/learned_mpc.py", "dynamics.safetensors", "LEAR
 # Times ahead at which predictions are judged [s].
 AHEAD = (0.02, 0.2)
 _HEADS = ("model", "acceleration [rad/s^2]", "after 0.02 s [deg]", "after 0.2 s [deg]", "largest then [deg]")
+# What some of them mean; the others are RMSE of the bend.
+_MEANT = {"acceleration": "RMSE of the acceleration", "largest then": "largest error of the bend after 0.2 s"}
 _TEXT = f'''"""The controller learned-mpc over the network that this run trained: FILE:{NAME} names it."""
 
 from wristctl.learning.learned_mpc import learned_mpc
@@ -140,15 +143,19 @@ def keep_dynamics(
         key = name.replace("-", "_").replace(" ", "_")
         for head, value, size in zip(_HEADS[1:], values, (*sizes, sizes[-1]), strict=True):
             measure, _, unit = head.rstrip("]").partition(" [")
-            label = f"{key}_{measure.replace(' ', '_').replace('.', '')}"
-            least = "largest error" if measure == "largest then" else "RMSE"
-            meaning = f"{name}: {least} of the {measure} in held-out motions"
+            label = f"{key}_{_in_ms(measure).replace(' ', '_')}"
+            meaning = f"{name}: {_MEANT.get(measure) or f'RMSE of the bend {measure}'} in held-out motions"
             findings.metric(label, value, unit, "lower", len(size), meaning=meaning)
-    findings.headline("network_after_02_s", "network_acceleration", "one_segment_model_after_02_s")
+    findings.headline("network_after_200_ms", "network_acceleration", "one_segment_model_after_200_ms")
     findings.figure("prediction", prediction, dynamics, samples, int(held_out[0]))
     tables = [Table("", _HEADS, rows)]
     where = str(data.path) if data else ""
     return TrainedDynamics(session.study, findings, tables, dynamics, trials, samples, held_out, where)
+
+
+def _in_ms(measure: str) -> str:
+    """A measure with its time in whole milliseconds, as a name of a metric can have it: after 200 ms."""
+    return re.sub(r"([\d.]+) s\b", lambda found: f"{1e3 * float(found[1]):g} ms", measure)
 
 
 def _parts(samples: Transitions, rows: Rows) -> tuple[Array, Array, Array]:
