@@ -143,6 +143,12 @@ def test_worlds_that_another_tuning_does_not_lose_are_told() -> None:
     assert "another tuning" not in tuned(1, 3) and "another tuning" not in tuned(40, 40)
 
 
+@pytest.mark.parametrize(("factor", "cell"), [(1.0, "bb 2"), (1e-9, "bb >")])
+def test_beside_an_error_too_small_to_be_told_a_ratio_is_a_bound(factor: float, cell: str) -> None:
+    (line,) = decision_table([ranked(row("a/x", factor), row("bb/x", 2.0))], {"a/x": "a", "bb/x": "bb"}).rows
+    assert str(line[-1]).startswith(cell)
+
+
 def test_conditions_that_no_question_parts_have_a_line_each() -> None:
     rows = row("a/x", 1.0), row("bb/x", 2.0)
     table = decision_table([ranked(*rows), ranked(*rows)], {"a/x": "a", "bb/x": "bb"})

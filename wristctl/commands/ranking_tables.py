@@ -194,7 +194,8 @@ def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str
     if len(groups) > 1:
         after = groups[1][0]
         ratio = ranking.means[after].value / ranking.means[row].value
-        following = f"{names[ranking.labels[after]]} {two(ratio, DIGITS)}"
+        over = ">" * degrees(ranking.means[row].value).startswith("<")  # the least that is told: it may be far less
+        following = f"{names[ranking.labels[after]]} {over}{two(ratio, DIGITS)}"
     equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
     return names[ranking.labels[row]], with_interval(ranking, row), equal, following
 
