@@ -367,3 +367,14 @@ def test_sensor_and_motors_may_be_given_by_their_level_alone(tmp_path: Path) -> 
         assert (loop.sensor, loop.actuator) == (Sensor(level="camera"), Actuator(level="tendon", friction=0.2))
     with pytest.raises(UserError, match=r"loop\.sensor\.level - fix: did you mean 'camera'"):
         load_study([file], ["simulate.loop.sensor=camra"])
+
+
+def test_tendons_may_be_given_by_their_directions_alone(tmp_path: Path) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text("wrist: {tendons: [0, 120.5, {angle_deg: 240, radius: 0.01}]}\n")
+    places = load_study([file]).wrist.tendons
+    assert isinstance(places, tuple) and [place.angle_deg for place in places] == [0.0, 120.5, 240.0]
+    assert [place.radius for place in places] == [None, None, 0.01]
+    for wrong in ("[0, true, 240]", "[0, x, 240]"):
+        with pytest.raises(UserError, match=r"wrist\.tendons\.1"):
+            load_study([], [f"wrist.tendons={wrong}"])

@@ -61,7 +61,7 @@ def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:
     middle = tuple((gain.low * gain.high) ** 0.5 for gain in law.gains.values())
     try:
         seconds = 1e-6 * step_time(law, gains[-1] if gains else middle, study.wrist).median * ticks
-        time = f"take about {duration(max(1.0, seconds))}"
+        time = f"take{'s' * (size.rollouts == 1)} about {duration(max(1.0, seconds))}"
     except UserError:  # the run that comes fails of it, and keeps what it said
         time = "take a time that is not known, for it fails when it is timed"
     cases = f"{size.rollouts:.0f} case{'s' * (size.rollouts > 1)}"

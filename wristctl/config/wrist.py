@@ -1,7 +1,7 @@
 """The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
 import math
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
@@ -15,6 +15,16 @@ class TendonPlace(Section):
     radius: float | None = quantity(None, "m", "distance from the wrist's axis; null: wrist.tendon_radius", ge=0)
     ends_at: int | None = choice(None, "disc that the tendon ends at, the clamped one being 1; null: the last", ge=2)
     multiplicity: int = choice(1, "number of tendons alike at this place", ge=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_angle(cls, given: Any) -> Any:
+        """A place given by its direction alone, 120, as a place."""
+        try:
+            number = isinstance(given, str | int | float) and not isinstance(given, bool)
+            return {"angle_deg": float(given)} if number else given
+        except ValueError:
+            return given
 
 
 class WristParameters(Section):

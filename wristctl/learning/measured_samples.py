@@ -111,7 +111,11 @@ def samples_of_courses(courses: Sequence[RecordedCourse], count: int | None, rng
         raise UserError(problem, odd.name, "the same columns in each recording")
     total = sum(len(course.theta) for course in courses)
     if total < _FEWEST:
-        raise UserError(f"{total} samples are known", "gen-data", f"at least {_FEWEST}: name longer recordings")
+        raise UserError(
+            f"{total} sample{'s are' if total != 1 else ' is'} known",
+            "gen-data",
+            f"at least {_FEWEST}: name longer recordings",
+        )
     rows = np.sort(rng.choice(total, total if count is None else min(count, total), replace=False))
     tip, theta = (np.concatenate([getattr(course, name) for course in courses])[rows] for name in ("tip", "theta"))
     columns = [np.concatenate([course.others[key] for course in courses])[rows] for key in names[0]]

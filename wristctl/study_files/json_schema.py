@@ -42,6 +42,7 @@ def study_schema() -> dict[str, Any]:
         for named_by in NAMED_BY:
             if named_by in section.get("properties", ()):
                 sections[name] = {"anyOf": [section["properties"][named_by], section]}
+    sections["TendonPlace"] = {"anyOf": [{"type": "number"}, sections["TendonPlace"]]}
     include = {"type": "array", "items": {"type": "string"}, "description": "study files that are read before this one"}
     schema["properties"] = {"include": include} | schema["properties"]
     return {"$schema": _DRAFT, "title": "Study of wristctl", **{k: v for k, v in schema.items() if k != "title"}}
