@@ -20,6 +20,7 @@ from wristctl.config.plant import Actuator, Disturbances, Push, Sensor
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.study_files.keys import field_at, keys_of, section_keys, unit_of
+from wristctl.study_files.keywords import NAMED_BY
 from wristctl.study_files.resolved import sections_read
 
 FILE = Path(__file__).parents[1] / "wristctl" / "arguments.py"
@@ -85,20 +86,18 @@ def typed(kind: Any, shown: dict[type[Section], None]) -> str:
         if kind not in TYPED:
             return "Mapping[str, Any]"
         shown.setdefault(kind)
-        return name_of(kind)
+        by_name = " | str" * any(name in keys_of(kind) for name in NAMED_BY) + " | float" * (kind is TendonPlace)
+        return f"{name_of(kind)}{by_name}"
     if kind is Any:
         return "Any"
     return str(kind.__name__)
 
 
-def leaves(
-    keys: Sequence[tuple[str, Any]], shown: dict[type[Section], None], of_function: bool = False
-) -> Iterator[str]:
-    """A line for each key; a function takes a group with a `kind` by the name of that alone."""
+def leaves(keys: Sequence[tuple[str, Any]], shown: dict[type[Section], None]) -> Iterator[str]:
+    """A line for each key."""
     for key, field in keys:
         unit = unit_of(field)
-        by_name = " | str" if of_function and "kind" in keys_of(field.annotation) else ""
-        yield f"    {key}: {typed(field.annotation, shown)}{by_name}" + f"  # {unit}" * bool(unit)
+        yield f"    {key}: {typed(field.annotation, shown)}" + f"  # {unit}" * bool(unit)
 
 
 def functions(shown: dict[type[Section], None]) -> Iterator[str]:
@@ -112,7 +111,7 @@ def functions(shown: dict[type[Section], None]) -> Iterator[str]:
             field = field_at((section.replace("_", "-"),))[1]
             if field is not None and section not in own and section != name:
                 keys.append((section, field))
-        lines = list(leaves(keys, shown, of_function=True))
+        lines = list(leaves(keys, shown))
         title = "".join(part.capitalize() for part in name.split("_"))
         text = f'class {title}Arguments(SharedArguments, total=False):\n    """Keywords of `{name}`."""\n'
         yield "\n".join([text, *lines])

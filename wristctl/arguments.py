@@ -24,7 +24,7 @@ class WristKeys(TypedDict, total=False):
     taper: float
     damping: float  # N m s/rad
     tendon_radius: float  # m
-    tendons: Literal["three", "four", "five", "six"] | Sequence[TendonPlaceKeys]
+    tendons: Literal["three", "four", "five", "six"] | Sequence[TendonPlaceKeys | float]
     pretension: float  # N
     tension_limit: float  # N
     range_deg: float  # deg
@@ -38,8 +38,8 @@ class LoopKeys(TypedDict, total=False):
     plant_segments: int
     plant: Mapping[str, Any]
     disturbances: DisturbancesKeys
-    actuator: ActuatorKeys
-    sensor: SensorKeys
+    actuator: ActuatorKeys | str
+    sensor: SensorKeys | str
     control_period: float  # s
     substeps: int | None
     limits: bool
@@ -230,7 +230,7 @@ class CompareArguments(SharedArguments, total=False):
 
     controllers: Sequence[RowKeys | str]
     loops: Mapping[str, LoopKeys]
-    references: Sequence[ReferenceKeys]
+    references: Sequence[ReferenceKeys | str]
     inverses: Sequence[Literal["none", "closed-form", "network"]]
     directions: Sequence[Literal["ulnar", "radial", "flexion", "extension"]]
     worlds: Mapping[str, Any]
@@ -250,7 +250,7 @@ class RecommendArguments(SharedArguments, total=False):
     loop: LoopKeys
     draw: Mapping[str, str | Sequence[bool | int | float | str]]
     known: Mapping[str, str | Sequence[bool | int | float | str]]
-    references: Sequence[ReferenceKeys]
+    references: Sequence[ReferenceKeys | str]
     horizon: float  # s
     largest_deg: float  # deg
     draws: int
@@ -346,8 +346,8 @@ class HwRunArguments(SharedArguments, total=False):
     camera_2: str
     real_time: bool
     priority: bool
-    actuator: ActuatorKeys
-    sensor: SensorKeys
+    actuator: ActuatorKeys | str
+    sensor: SensorKeys | str
     homing: Mapping[str, Any]
     safety: Mapping[str, Any]
     load_cells: Mapping[str, Any] | None
