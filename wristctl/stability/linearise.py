@@ -85,24 +85,21 @@ def rest_of(
     A loop that is far from stable runs off its course from where it is looked for. It is followed there from where the
     same loop rests with all gains smaller, which is raised step by step.
     """
-    ticks = LoopTicks(law, gains, loop, wrist, theta)
-    point = resting_point(ticks)
-    weaker = iter(_WEAKER if point is None else ())
-    for share in weaker:
-        point = resting_point(LoopTicks(law, _times(gains, share), loop, wrist, theta))
-        if point is None:
-            continue
-        while point is not None and share < 1.0:
-            share = min(1.0, _STRONGER * share)
-            ticks = LoopTicks(law, _times(gains, share), loop, wrist, theta)
-            rest = _newton(ticks, RestingPoint(point.state, ticks.slopes(point.state)))
-            point = rest if change_in(ticks, rest) < _STILL else None
-        break
-    return ticks, point
 
+    def at(share: float) -> LoopTicks:
+        return LoopTicks(law, [share * gain for gain in gains], loop, wrist, theta)
 
-def _times(gains: Sequence[float], share: float) -> list[float]:
-    return [share * gain for gain in gains]
+    whole = at(1.0)
+    if (point := resting_point(whole)) is not None:
+        return whole, point
+    found = ((share, resting_point(at(share))) for share in _WEAKER)
+    share, point = next((one for one in found if one[1] is not None), (1.0, None))
+    while point is not None and share < 1.0:
+        share = min(1.0, _STRONGER * share)
+        ticks = at(share)
+        rest = _newton(ticks, RestingPoint(point.state, ticks.slopes(point.state)))
+        point = rest if change_in(ticks, rest) < _STILL else None
+    return whole, point
 
 
 def change_in(loop: LoopTicks, point: RestingPoint) -> float:
@@ -119,7 +116,7 @@ def change_in(loop: LoopTicks, point: RestingPoint) -> float:
 
 
 def _acting(loop: LoopTicks, point: RestingPoint) -> NDArray[np.bool_]:
-    """Which variables (x,) change another one, or anything that is recorded but themselves."""
+    """Which variables (x,) are no memory of a controller, or one that changes another variable."""
     memory = np.array(loop.names) == "memory"
     others = ~np.eye(len(loop.sizes), dtype=bool)
     acts = np.zeros(len(loop.sizes), bool)
