@@ -124,6 +124,22 @@ def test_what_load_study_is_given_is_a_file_and_overrides() -> None:
             wristctl.load_study(*given)
 
 
+def test_what_a_command_is_given_for_a_study_is_one() -> None:
+    given: Any = {"wrist": {"length": 0.09}}
+    with pytest.raises(UserError, match=r"a dict is no study - simulate - fix: .*wrist={\.\.\.}"):
+        wristctl.simulate(given)
+    with pytest.raises(UserError, match=r"0.005 s hold fewer than 10 control periods .*at least 0.01 s"):
+        wristctl.simulate(horizon=0.005)
+
+
+def test_a_kind_of_run_that_there_is_none_of_is_refused(tmp_path: Path) -> None:
+    assert not len(wristctl.runs(kind="simulat", out=tmp_path)), "where there are no runs there is nothing to say"
+    wristctl.simulate(horizon=0.05, out=tmp_path)
+    assert len(wristctl.runs(kind="simulat*", out=tmp_path)) == 1
+    with pytest.raises(UserError, match=r"unknown kind 'simulat' .*did you mean 'simulate'"):
+        wristctl.runs(kind="simulat", out=tmp_path)
+
+
 def test_a_wrist_in_plain_arguments_moves_as_that_of_a_study_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\nsimulate: {horizon: 1.2}\n")

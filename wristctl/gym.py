@@ -80,6 +80,10 @@ def observed_in(planes: int) -> tuple[Observed, ...]:
     )
 
 
+# What episodes are drawn for: of one loop and, with True, of a family.
+_SPLITS = {False: ("learn", "judged"), True: ("learn", "tune", "validation", "test")}
+
+
 class _Episodes:
     """The episodes of a study's loop or family, so many at a time: each number is a world, a motion and its noise."""
 
@@ -103,6 +107,9 @@ class _Episodes:
             raise UserError(f"no family {family!r}", "family", fix)
         if actions not in ("torques", "tensions"):
             raise UserError(f"no actions are {actions!r}", "actions", meant(actions, ("torques", "tensions")))
+        splits = _SPLITS[bool(family)]
+        if split not in splits:
+            raise UserError(f"no split is {split!r}", "split", meant(split, splits))
         simulated = self.study.simulate
         self.wrist, self.loop = self.study.wrist, self.study.families[family].loop if family else simulated.loop
         drawn = asked_of(self.study.families[family]) if family else []

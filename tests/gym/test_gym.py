@@ -222,6 +222,9 @@ def test_what_cannot_be_stepped_says_how_to_mend_it(tmp_path: Path) -> None:
         env.step(np.array([np.nan]))
     with pytest.raises(UserError, match=r"actions of shape \(2,\) .*fix: \(1,\)"):
         env.step(np.zeros(2))
+    for family in ("", "bent"):
+        with pytest.raises(UserError, match=r"no split is 'lern' - split - fix: did you mean 'learn'"):
+            WristEnv(study, family, split="lern")
     with pytest.raises(UserError, match="0 wrists - num_envs"):
         WristVectorEnv(0)
     with pytest.raises(UserError, match=r"there is no study file .*nosuch"):

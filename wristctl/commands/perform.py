@@ -30,6 +30,7 @@ from wristctl.records.journal import jsonable
 from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
 from wristctl.records.run_writer import Undrawn
 from wristctl.study_files.error_messages import located
+from wristctl.study_files.keywords import function_of
 from wristctl.study_files.load import read_study
 from wristctl.study_files.strict_yaml import KeyPath
 from wristctl.study_files.sweeps import check_all_sizes
@@ -207,6 +208,9 @@ def study_with(
 
     Sizes that cannot well be meant are refused in a file and in settings; those of a study are meant.
     """
+    if not isinstance(study, Study | str | Path | None):
+        what = f"a {type(study).__name__} is no study"
+        raise UserError(what, function_of(command), "a study, its file or name; settings by their names: wrist={...}")
     base, files = (study, []) if isinstance(study, Study) else (None, [Path(study)] if study is not None else [])
     overrides = base.overrides if base is not None else {}
     if base is not None and not settings:

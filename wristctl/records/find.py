@@ -2,19 +2,19 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from operator import eq, ge, gt, le, lt, ne
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from wristctl.errors import OUT, Argument, Call, Phrase, UserError, meant, nearest
 from wristctl.reader_units import in_degrees
 from wristctl.records.index import RESULTS, IndexEntry, indexed, run_names
 from wristctl.records.manifest import MANIFEST
-from wristctl.records.run import NAME_A_RUN, Run
+from wristctl.records.run import NAME_A_RUN, Run, RunState
 from wristctl.records.tags import known_tags
 from wristctl.study_files.keys import command_of, is_command
 
@@ -189,6 +189,12 @@ def entries(results: Path = RESULTS) -> list[IndexEntry]:
     return [replace(entry, tags=tags[entry.id]) if entry.id in tags else entry for entry in indexed(results)]
 
 
+def check_choice(option: str, value: str | None, allowed: Collection[str]) -> None:
+    """UserError for a value that is none of those allowed, and no pattern; where none are there is nothing to say."""
+    if value is not None and allowed and "*" not in value and value not in allowed:
+        raise UserError(f"unknown {option.removesuffix('s')} {value!r}", Argument(option, value), meant(value, allowed))
+
+
 def select(
     listed: Iterable[IndexEntry],
     kind: str | None = None,
@@ -201,11 +207,14 @@ def select(
     typed: bool = False,
 ) -> list[IndexEntry]:
     """The entries that meet every condition: `where` like "rmse<0.5deg", ages like 30m, 12h, 2d; kind and label may be
-    patterns with *.
+    patterns with *; a kind that none has, or a state that there is none of, is an error.
 
     A number of `where` without a unit is in that of files (SI), or, if `typed`, in that which people read (deg). Raises
     UserError for a condition that cannot be read, a metric that no run has, or none in that unit.
     """
+    listed = list(listed)
+    check_choice("kind", kind, {entry.kind for entry in listed})
+    check_choice("state", state, get_args(RunState))
     chosen = [
         entry
         for entry in listed

@@ -241,6 +241,8 @@ def simulate(
 
 # Integration steps of one rollout: an hour and more.
 MOST_STEPS = 1e10
+FEWEST = 10
+"""Control periods of a rollout."""
 # Integration steps of all rollouts: a month on one core.
 MOST_IN_ALL = 1e13
 # Integration steps a second on a core, of four segments side by side.
@@ -284,7 +286,7 @@ def check_one_plane(loop: Loop) -> None:
 
 
 def check_size(size: Size, planes: int = 1) -> None:
-    """UserError, with the most that there is room for, where rollouts ask for too much one by one or together.
+    """UserError, with the most that there is room for, where rollouts ask for too much one by one or together, or none.
 
     Also for loops of two planes where all that is run has one.
     """
@@ -292,6 +294,9 @@ def check_size(size: Size, planes: int = 1) -> None:
     for loop in size.loops:
         if planes == 1:
             check_one_plane(loop)
+        if horizon < FEWEST * loop.control_period * (1.0 - 1e-9):
+            fix = f"at least {FEWEST * loop.control_period:g} s"
+            raise UserError(f"{horizon:g} s hold fewer than {FEWEST} control periods of the loop", "horizon", fix)
         steps = _steps(loop, horizon)
         if steps > MOST_STEPS:
             most, problem = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"

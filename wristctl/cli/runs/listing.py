@@ -3,9 +3,9 @@
 import json
 import shlex
 import shutil
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 import typer
 
@@ -13,16 +13,14 @@ from wristctl.cli.json_output import print_json
 from wristctl.cli.options import RESULTS, Json, Out, Ref, run_ids
 from wristctl.cli.output import say
 from wristctl.commands.printed_table import COLUMNS, Table, number
-from wristctl.errors import Argument, UserError, meant
 from wristctl.escape import printable
 from wristctl.reader_units import in_degrees
 from wristctl.records import Run, open_run
 from wristctl.records.difference import Change, difference
-from wristctl.records.find import condition, entries, in_order, select
+from wristctl.records.find import check_choice, condition, entries, in_order, select
 from wristctl.records.index import IndexEntry
 from wristctl.records.lineage import ancestry, dependents
 from wristctl.records.manifest import read_overview
-from wristctl.records.run import RunState
 from wristctl.records.tags import change_tags, known_tags
 
 _LISTED_HEADS = {"wall_s": "wall [s]", "chief": "chief metric"}
@@ -54,8 +52,6 @@ def ls(
     """
     where = where or []
     indexed = entries(out)
-    _check_choice("kind", kind, {entry.kind for entry in indexed})
-    _check_choice("state", state, get_args(RunState))
     listed = in_order(select(indexed, kind, label, state, tagged, where, newer, older, typed=True), sort)
     listed = listed[::-1] if reverse else listed
     if as_json:
@@ -108,7 +104,7 @@ def _chosen(listed: list[IndexEntry], columns: str) -> Table:
         *(metric for entry in listed for metric in entry.metrics),
     }
     for name in names:
-        _check_choice("columns", name, available)
+        check_choice("columns", name, available)
     return _of_columns(listed, names)
 
 
@@ -119,11 +115,6 @@ def _of_columns(listed: list[IndexEntry], names: list[str]) -> Table:
         (unit,) = units[name] if len(units[name]) == 1 else ("",)
         heads.append(_LISTED_HEADS.get(name, name) + f" [{unit}]" * bool(unit and not name.endswith(f"_{unit}")))
     return Table("", heads, [[_cell(entry, name, len(units[name]) > 1) for name in names] for entry in listed])
-
-
-def _check_choice(option: str, value: str | None, allowed: Collection[str]) -> None:
-    if value is not None and allowed and "*" not in value and value not in allowed:
-        raise UserError(f"unknown {option.removesuffix('s')} {value!r}", Argument(option, value), meant(value, allowed))
 
 
 def _cell(entry: IndexEntry, name: str, with_unit: bool) -> Any:
