@@ -190,7 +190,7 @@ def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call
     code, out, _ = call("simulate", "--set", "horizon=0.3", *CAMERA, loop, "--set", "reference.duration=0.2")
     run = open_run("latest:simulate")
     every, known = run.data("repetitions"), run.metrics["rmse"]
-    assert code == 0 and "8 repetitions" in out and re.search(r"figure +median +95 % low +95 % high", out)
+    assert code == 0 and "8 repetitions" in out and re.search(r"figure +median of 8 +95 % low +95 % high", out)
     assert len(every) == 8 and every["rmse"].nunique() == 8
     assert known["value"] == pytest.approx(every["rmse"].median()) and known["n"] == 8
     low, high = known["interval"]

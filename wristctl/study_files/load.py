@@ -274,7 +274,7 @@ def _all_in_full(data: Any, lines: dict[KeyPath, int], path: KeyPath = ()) -> An
         return {key: _all_in_full(item, lines, (*path, key)) for key, item in data.items()}
     if isinstance(data, tuple):
         return tuple(_all_in_full(item, lines, (*path, position)) for position, item in enumerate(data))
-    whole = in_full(data, path)
+    whole = data if path == ("sweep",) else in_full(data, path)  # a run that was swept has a list there
     if isinstance(whole, dict) and path in lines:
         lines |= {(*path, key): lines[path] for key in whole}
     return whole
