@@ -191,7 +191,7 @@ def _merge_keyword(
     if name == "wrist" and isinstance(value, str | Path):
         _merge_wrist(data, origins, Path(value), where, former)
         return
-    whole = as_a_file_has_it(value, where)
+    whole = in_full(as_a_file_has_it(value, where), path)
     for key in reversed(path):
         whole = {key: whole}
     _merge(data, _today(Document(whole, {}), where, None, former), where, origins)
