@@ -213,7 +213,8 @@ def select(
     UserError for a condition that cannot be read, a metric that no run has, or none in that unit.
     """
     listed = list(listed)
-    check_choice("kind", kind, {entry.kind for entry in listed})
+    if kind is not None and not is_command(kind):
+        check_choice("kind", kind, {entry.kind for entry in listed})
     check_choice("state", state, get_args(RunState))
     chosen = [
         entry
