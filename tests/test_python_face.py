@@ -128,8 +128,8 @@ def test_what_a_command_is_given_for_a_study_is_one() -> None:
     given: Any = {"wrist": {"length": 0.09}}
     with pytest.raises(UserError, match=r"a dict is no study - simulate - fix: .*wrist={\.\.\.}"):
         wristctl.simulate(given)
-    with pytest.raises(UserError, match=r"0.005 s hold fewer than 10 control periods .*at least 0.01 s"):
-        wristctl.simulate(horizon=0.005)
+    with pytest.raises(UserError, match=r"0.003 s hold fewer than 5 control periods .*at least 0.005 s"):
+        wristctl.simulate(horizon=0.003)
 
 
 def test_a_kind_of_run_that_there_is_none_of_is_refused(tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ def simulate(
 
 # Integration steps of one rollout: an hour and more.
 MOST_STEPS = 1e10
-FEWEST = 10
+FEWEST = 5
 """Control periods of a rollout."""
 # Integration steps of all rollouts: a month on one core.
 MOST_IN_ALL = 1e13
