@@ -15,11 +15,12 @@ import wristctl
 from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands import printed_table as answer_lines
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import check_inverses
+from wristctl.commands.inputs_of_loops import check_inverse
 from wristctl.commands.printed_table import degrees
 from wristctl.commands.simulate.command import SIMULATE
 from wristctl.commands.simulate.results import Simulated
 from wristctl.comparison.repetition_spread import spread
+from wristctl.config.loop import Reference
 from wristctl.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.simulation import closed_loop
@@ -160,10 +161,10 @@ def test_behind_a_network_the_error_to_the_angle_that_was_wanted_of_it_is_told(s
 
 def test_a_network_that_no_reference_goes_through_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     network: Any = {"network": None}
-    for inverses, given, warned in (("none", {}, False), ("none", network, True), ("network", network, False)):
+    for inverse, given, warned in (("none", {}, False), ("none", network, True), ("network", network, False)):
         caplog.clear()
-        check_inverses([inverses], Inputs(given))
-        assert ("no reference goes through the network" in caplog.text) == warned
+        check_inverse(Reference.model_validate({"inverse": inverse}), Inputs(given))
+        assert ("does not go through the network" in caplog.text) == warned
 
 
 def plan(*settings: str) -> str:

@@ -188,13 +188,17 @@ def why_two_planes(wrist: WristParameters, asked: Iterable[Asked], which: str = 
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
-    """UserError where a reference goes through a network and none is among the inputs; a warning where none does."""
-    through = "network" in inverses
-    if through and "network" not in inputs:
+    """UserError where a reference goes through a network and none is among the inputs."""
+    if "network" in inverses and "network" not in inputs:
         reason = "the reference goes through a network, and none is given"
         raise UserError(reason, "reference.inverse", Argument("network"))
-    if "network" in inputs and not through:
-        log.warning("no reference goes through the network that is given: that takes reference.inverse: network")
+
+
+def check_inverse(reference: Reference, inputs: Inputs) -> None:
+    """`check_inverses` of the one reference of a command; a warning where it does not go through a network given."""
+    check_inverses([reference.inverse], inputs)
+    if "network" in inputs and reference.inverse != "network":
+        log.warning("the reference does not go through the network that is given: that takes inverse: network")
 
 
 def inverses_of(references: Iterable[Reference]) -> set[str]:

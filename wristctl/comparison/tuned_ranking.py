@@ -19,7 +19,7 @@ from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised, plain
 from wristctl.comparison.controller_ranking import STREAM
 from wristctl.comparison.repeated_tunings import HALVES, Firsts, RepeatedTunings, firsts, median_tuning
-from wristctl.comparison.tie_groups import share
+from wristctl.comparison.tie_groups import Share, share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
 from wristctl.config.families import TOLERATED, Family
 
@@ -94,6 +94,11 @@ class TunedRanking(WorldRanking):
         """
         return float(np.exp(Resampled(np.log(penalised(self.scores[row])), STREAM).means[0]))
 
+    @cached_property
+    def lost_of_tunings(self) -> list[list[Share]]:
+        """In how many worlds each tuning of each row fails, swings, chatters or does not converge."""
+        return [[share(~np.isfinite(one.rmse) | one.swings) for one in tunings] for tunings in self.tunings]
+
     def tunings_frame(self) -> pd.DataFrame:
         """A line for each tuning of each row that was tuned: its error [rad], and in how many worlds it is lost."""
         import pandas as pd
@@ -101,8 +106,7 @@ class TunedRanking(WorldRanking):
         lines = []
         for row, tunings in enumerate(self.tunings):
             means = np.exp(self.logarithms[row].mean(axis=(1, 2)))
-            for number, tuning in enumerate(tunings if len(tunings) > 1 else []):
-                lost = share(~np.isfinite(tuning.rmse) | tuning.swings)
+            for number, lost in enumerate(self.lost_of_tunings[row] if len(tunings) > 1 else []):
                 lines.append(
                     {"row": self.labels[row], "tuning": number + 1, "published": number == self.published[row],
                      "rmse": means[number], "lost": lost.times, "worlds": lost.n}

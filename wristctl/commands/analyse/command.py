@@ -22,11 +22,10 @@ from wristctl.commands.analyse.results import (
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
-    check_inverses,
+    check_inverse,
     check_motion,
     check_row,
     identified,
-    inverses_of,
     network_for,
     planes_of_simulation,
     tuned_gains,
@@ -69,7 +68,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_motion(known, planes)
-        check_inverses(inverses_of([chosen.reference]), inputs)
+        check_inverse(chosen.reference, inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:

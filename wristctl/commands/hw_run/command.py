@@ -11,11 +11,10 @@ from wristctl.commands.calibrate.wrist import calibration_in
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
-    check_inverses,
+    check_inverse,
     check_reach,
     check_row,
     identified,
-    inverses_of,
     network_for,
     tuned_gains,
 )
@@ -60,7 +59,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_reach([settings.reference], modelled, "reference")
         elif settings.planes == 2:
             check_bends_of_trials(settings, known)
-        check_inverses(inverses_of([settings.reference]), inputs)
+        check_inverse(settings.reference, inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
     motions = len(set(settings.directions))
     if settings.planes == 2:

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
-    check_inverses,
+    check_inverse,
     check_motion,
     check_row,
     identified,
-    inverses_of,
     network_for,
     planes_of_simulation,
     tuned_gains,
@@ -52,7 +51,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_live(settings.reference, [settings.controller], known.wrist, sample_period(settings.loop.control_period))
         if not settings.reference.is_live:
             check_motion(known, planes)
-        check_inverses(inverses_of([settings.reference]), inputs)
+        check_inverse(settings.reference, inputs)
         check_size(size(study), planes=planes)
     times, where = size(study).rollouts, " in two planes" * (planes == 2)
     truth = truth_told(known.wrist, {"simulate": settings.loop})

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from wristctl.commands.answer import Answer, rest
 from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
 from wristctl.comparison.bootstrap import plain
 from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS, HALVES
-from wristctl.comparison.tie_groups import share
 from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
 
 # Share of the worlds by which tunings of a controller differ in those that they lose where that is told; so many.
@@ -56,8 +53,8 @@ def lost_otherwise(rankings: Sequence[TunedRanking]) -> str:
     """
     found = []
     for ranking in rankings:
-        for row, tunings in enumerate(ranking.tunings):
-            lost = [int(share(~np.isfinite(one.rmse) | one.swings).times) for one in tunings]
+        for row, tunings in enumerate(ranking.lost_of_tunings):
+            lost = [one.times for one in tunings]
             own = lost.pop(ranking.published[row])
             other = max(lost, key=lambda times: abs(times - own), default=own)
             if abs(other - own) > _OTHERWISE * ranking.count:
