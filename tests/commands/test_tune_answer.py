@@ -23,6 +23,7 @@ from wristctl.commands.ranking_answer import condition_of_loop
 from wristctl.commands.session import Done, Event, Unattended
 from wristctl.commands.tune.answer import Beside, Start, answer_of, at_edge, beside_feedforward, starts_of
 from wristctl.commands.tune.command import TUNE, Tuned
+from wristctl.commands.tune.searches import others_of
 from wristctl.config.compare import CompareSettings
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
@@ -94,6 +95,28 @@ def test_the_time_left_of_a_search_counts_the_choice_the_other_searches_and_what
     (total, first), (_, last) = told["tuning smc"], told["tuning pid"]
     assert total == load_study(None, *STUDY).tune.iterations and first == pytest.approx(last * 2.0 + 1.0, rel=0.5)
     assert first > 1.0 + last > 1.0
+
+
+def test_the_work_of_the_loops_that_gains_are_tried_on_besides_is_reckoned_by_their_segments_steps_and_noise() -> None:
+    """On the default study's loops: the loop of the search is none of them, and a family has none."""
+    study = load_study(None)
+    others, loops = others_of(study), study.tune.loops
+    searched = {scenario.loop for scenario in study.tune.scenarios}
+    assert set(others) == set(loops) - searched and others
+    (own,) = searched
+
+    def with_loops(**changes: Any) -> dict[str, float]:
+        changed = {name: loop.model_copy(update=changes) for name, loop in loops.items() if name not in searched}
+        settings = study.tune.model_copy(update={"loops": {own: loops[own], **changed}})
+        return others_of(study.model_copy(update={"tune": settings}))
+
+    one, two = with_loops(plant_segments=1), with_loops(plant_segments=2)
+    assert two == pytest.approx({name: 2.0 * work for name, work in one.items()})
+    coarse = with_loops(plant_segments=1, control_period=2.0 * loops[own].control_period)
+    fine = with_loops(plant_segments=1, control_period=loops[own].control_period)
+    assert all(fine[name] > coarse[name] for name in fine)
+    worlds = study.tune.worlds.model_copy(update={"family": "any"})
+    assert others_of(study.model_copy(update={"tune": study.tune.model_copy(update={"worlds": worlds})})) == {}
 
 
 def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tuned) -> None:

@@ -38,9 +38,6 @@ if TYPE_CHECKING:
     from wristctl.tuning.margin import Stood
     from wristctl.tuning.search import Search
 
-# Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
-_ELSEWHERE = 6
-
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tuned(StudyResult):
@@ -168,7 +165,7 @@ def tune(session: Session) -> Tuned:
 
     from wristctl.commands.truth_table import truth_tables
     from wristctl.commands.tune.answer import beside_feedforward, searches_table, starts_of
-    from wristctl.commands.tune.searches import keep_files, margins, search_all, tried_elsewhere
+    from wristctl.commands.tune.searches import keep_files, margins, others_of, search_all, tried_elsewhere
     from wristctl.control.table import controller
     from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
@@ -181,7 +178,7 @@ def tune(session: Session) -> Tuned:
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
-    tried = (7 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
+    tried = 7 * len(cases) + sum(others_of(study).values()) + sum(map(len, LADDERS)) * len(searched)
     searches = search_all(session, study, network, tried)
     gains = {name: best.gains for name, best in searches.items()}
     with session.progress("trying the gains found"):

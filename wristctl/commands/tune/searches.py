@@ -13,11 +13,13 @@ from wristctl.commands.kept_studies import asked_for, file_of, gains_content, hw
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Done, Session
 from wristctl.commands.tune.answer import Motion
+from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.control.table import controller, write_gains
+from wristctl.processes import cores
 from wristctl.simulation.closed_loop import Size, scenario_of
 from wristctl.simulation.drawn_worlds import streams_of
-from wristctl.simulation.worlds import Draws
+from wristctl.simulation.worlds import Draws, is_random
 from wristctl.tuning.margin import CHANGES, OwnLoop, Stood
 from wristctl.tuning.objective import Judge, marks_of
 from wristctl.tuning.search import Search, Tried, finalists, history, judges_of, search, tried_of, tuning_cases
@@ -28,6 +30,8 @@ from wristctl.wrist.kinematics import Inverse
 _CLOSELY, _BESIDE, _PROMISING = 1.2, 20, 2
 # Seconds that the figures of a controller take, and in which its margins are found.
 _DRAWN, _MARGINS = 1.0, 0.1
+# Rollouts that a core takes at once in the time of these many.
+_TOGETHER = 3
 # Share of what a family draws at which one of its motions is tried.
 _WITHIN = 0.75
 
@@ -157,6 +161,28 @@ def margins(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, flo
     return stood
 
 
+def others_of(study: Study) -> dict[str, float]:
+    """The loops that no scenario is on, on which gains are tried: of each its time, in rollouts of the search.
+
+    There are few rollouts of each, which share no core with others.
+    """
+    settings = study.tune
+    if settings.worlds.family:
+        return {}
+    on = [scenario.loop for scenario in settings.scenarios]
+    rollout = sum(_effort(settings.loops[name], settings.horizon) for name in on) / len(on)
+    others = {name: loop for name, loop in settings.loops.items() if name not in on}
+    cases = {name: len(on) * (settings.repetitions if is_random(loop) else 1) for name, loop in others.items()}
+    return {
+        name: max(cases[name], _TOGETHER * cores()) * _effort(loop, settings.horizon) / rollout
+        for name, loop in others.items()
+    }
+
+
+def _effort(loop: Loop, horizon: float) -> float:
+    return loop.plant_segments * Size([loop], horizon).steps
+
+
 def tried_elsewhere(
     session: Session, study: Study, network: Inverse | None, gains: Mapping[str, Mapping[str, float]]
 ) -> dict[str, dict[str, dict[str, int]]]:
@@ -165,14 +191,11 @@ def tried_elsewhere(
     Plain Python is not tried on loops that it cannot keep up with.
     """
     settings = study.tune
-    searched = {scenario.loop for scenario in settings.scenarios}
-    others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
     tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    loops = [settings.loops[name] for name in others]
-    efforts = [loop.plant_segments * Size([loop], settings.horizon).steps for loop in loops]
-    done, whole = 0.0, sum(efforts) * len(gains)
+    others = others_of(study)
+    done, whole = 0.0, sum(others.values()) * len(gains)
     with session.progress("trying the gains on other loops", 100, "%", after=_MARGINS * len(gains)) as report:
-        for loop, effort in zip(others, efforts, strict=True):
+        for loop, effort in others.items():
             scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
             elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
             cases = tuning_cases(elsewhere, network)[0]
