@@ -101,6 +101,13 @@ def test_import_is_light() -> None:
 
 
 @pytest.mark.slow
+def test_a_simulation_waits_for_no_library_that_it_does_not_use() -> None:
+    unused = "{'pandas', 'scipy.optimize', 'torch', 'wristctl.trial'} & set(sys.modules)"
+    code = f"import sys, wristctl; wristctl.simulate(horizon=0.02); assert not {unused}, {unused}"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+
+
+@pytest.mark.slow
 def test_every_public_name_has_a_docstring() -> None:
     missing = []
     for file in PACKAGE.rglob("*.py"):

@@ -55,14 +55,14 @@ def listened(session: Session) -> Study:
 
     The wall clock paces what is listened for. Raises UserError without a run directory, and where nobody can be heard.
     """
-    from wristctl.simulation.live_reference import recorded
-    from wristctl.trial.live_datagrams import LiveReference
-    from wristctl.trial.trial_results import RECORD
-
     study, run = session.study, session.findings.run
     chosen = study.simulate
     if not chosen.reference.is_live:
         return study
+    from wristctl.simulation.live_reference import recorded
+    from wristctl.trial.live_datagrams import LiveReference
+    from wristctl.trial.trial_results import RECORD
+
     if run is None:
         problem = "a live reference is recorded in a run directory, and there is none"
         raise UserError(problem, "reference.kind", "a folder for it: out")
@@ -83,11 +83,11 @@ def listened(session: Session) -> Study:
 
 def with_record(session: Session) -> Session:
     """The session of trials whose live reference is over, with its record in place; another session as it is."""
-    from wristctl.simulation.live_reference import recorded
-    from wristctl.trial.trial_results import RECORD
-
     settings, run = session.study.hw_run, session.findings.run
     if run is None or not settings.reference.is_live:
         return session
+    from wristctl.simulation.live_reference import recorded
+    from wristctl.trial.trial_results import RECORD
+
     changed = settings.model_copy(update={"reference": recorded(settings.reference, run.path / RECORD)})
     return replace(session, study=session.study.model_copy(update={"hw_run": changed}))

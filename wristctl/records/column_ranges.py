@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
 from wristctl.arrays import Array
 from wristctl.records.recorded_table import Cells
@@ -30,6 +29,8 @@ _LEAST_BEND = 0.01
 
 def numbers_of(cells: Cells) -> Array:
     """Numbers of a column (T,); nan where there is none."""
+    import pandas as pd
+
     numbers: Array = pd.to_numeric(pd.Series(cells), errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
     return numbers
 

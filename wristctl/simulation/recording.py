@@ -6,7 +6,7 @@ are the rate and the acceleration. With `noise_deg` a quintic smoothing spline p
 Curve and Surface Fitting with Splines, 1993). Time counts from the first sample; after the last the angle is held.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -18,9 +18,7 @@ from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, meant
-from wristctl.records.log_columns import ANGLE, SYNONYMS
-from wristctl.records.log_converters import read_log
-from wristctl.records.log_looks import looked_at, telling
+from wristctl.records.log_columns import ANGLE, SYNONYMS, Units
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
 from wristctl.wrist.kinematics import TipPath, exact_arc
@@ -52,7 +50,7 @@ def read_recording(file: Path, column: str | None = None, names: str = "") -> Re
     none, with line and column: gaps, times that repeat, jumps, units that are not there or not known.
     """
     more = {} if column is None or column in SYNONYMS or column == "tip" else {column: ANGLE}
-    log = _looked_at(read_log(file, names, "recording", others=True, more=more))
+    log = _recorded(file, names, more)
     chosen = _angle_in(log, column)
     if chosen is None and not all(name in log.columns for name in TIP):
         fix = f"a header such as {_EXAMPLE}, or time [s],tip_x [mm],tip_y [mm]"
@@ -69,8 +67,12 @@ def read_recording(file: Path, column: str | None = None, names: str = "") -> Re
     return Recording(time - time[0], arc, chosen is None)
 
 
-def _looked_at(log: OpenLog) -> OpenLog:
+def _recorded(file: Path, names: str, more: Mapping[str, Units]) -> OpenLog:
     """A recording with the looks of a log, of its motion alone: what tendons did then is not asked for."""
+    from wristctl.records.log_converters import read_log
+    from wristctl.records.log_looks import looked_at, telling
+
+    log = read_log(file, names, "recording", others=True, more=more)
     log.whole("time", _EXAMPLE)
     seen = {name: column for name, column in log.columns.items() if not name.startswith(("spool_", "tension_"))}
     return telling(looked_at(replace(log, columns=seen), motion=False))
@@ -163,7 +165,7 @@ def _splined(time: Array, samples: Array, noise: float, times: Array) -> Array:
 
 def _of_two_planes(reference: Reference) -> tuple[OpenLog, Array | None, bool]:
     """A recording's log, the bends (T, 2) that it has, and whether its tips are followed, which then are all there."""
-    log = _looked_at(read_log(Path(reference.file or ""), reference.columns or "", "recording", others=True))
+    log = _recorded(Path(reference.file or ""), reference.columns or "", {})
     bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
     of_tips = (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP)
     if of_tips:

@@ -11,7 +11,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
@@ -62,6 +61,8 @@ def against_each_other(wrist: WristParameters, layout: TendonLayout) -> Array:
 
     They are as near to one for each tendon as there is without a push; what bends nothing has none.
     """
+    from scipy.optimize import nnls
+
     arms = layout.moment_arms(np.zeros(2), wrist.length, wrist.discs) * layout.multiplicity[:, None]
     size = np.abs(arms).max()
     rows = np.concatenate([_NO_TORQUE * arms.T / size, np.eye(len(arms))])
