@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 import tomllib
 from collections.abc import Iterator
@@ -68,6 +69,33 @@ def test_the_readme_names_the_paper_before_it_speaks_of_it_and_cites_it_as_the_c
     families = " and ".join(author["family-names"] for author in paper["authors"])
     assert f"title = {{{paper['title']}}}" in bibtex and f"author = {{{families}}}" in bibtex
     assert f"version = {{{citation['version']}}}" in bibtex and citation["authors"][0]["name"] in bibtex
+
+
+def test_what_the_examples_of_pages_import_is_there() -> None:
+    """Names too, of this package and of its tests: most examples are run by no test."""
+    found = set[tuple[str, str]]()
+    for page in PAGES:
+        for block in re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE):
+            for node in ast.walk(ast.parse(block)):
+                if isinstance(node, ast.Import):
+                    found |= {(alias.name, "") for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    found |= {(node.module, alias.name) for alias in node.names}
+                elif (
+                    isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "wristctl"
+                ):
+                    found.add(("wristctl", node.attr))
+    own = sorted(each for each in found if each[0].partition(".")[0] in ("wristctl", "tests"))
+    assert len(own) > 20
+    missing = []
+    for module, name in own:
+        try:
+            there = importlib.import_module(module)
+            if name and not hasattr(there, name):
+                importlib.import_module(f"{module}.{name}")
+        except ImportError as error:
+            missing.append(f"{module} {name}: {error}")
+    assert not missing
 
 
 NUMBERS = {"eighteen": 18, "nineteen": 19, "twenty": 20, "twenty-one": 21, "twenty-two": 22, "twenty-three": 23}
