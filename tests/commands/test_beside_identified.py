@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from wristctl.errors import UserError
 from wristctl.identification.ratios import SCHEMA
 from wristctl.records import Run, open_run, start_run
 from wristctl.study_files.load import read_study
+from wristctl.wrist.tendon_layout import TendonLayout
 
 STIFF = "wrist.stiffness=1.1"
 VALUES = {"gain": 0.8, "damping": 0.3, "delay": 6e-3}
@@ -33,9 +35,13 @@ CAMERA = {
 }
 
 
-def log_run(folder: Path, rate: float = 100.0, values: dict[str, float] | None = None, *settings: str) -> Run:
-    """A run that identified a log of two tendons, with a wrist of 95 mm."""
-    told = {"schema": SCHEMA, "values": values or VALUES, "angles": [0.0, 3.14159265], "radius": 0.02, "rate": rate}
+def log_run(
+    folder: Path, rate: float = 100.0, values: dict[str, float] | None = None, *settings: str, angles: int = 2
+) -> Run:
+    """A run that identified a log of two tendons, or of so many evenly round the axis, with a wrist of 95 mm."""
+    places = [2.0 * math.pi * number / angles for number in range(angles)]
+    told = {"schema": SCHEMA, "values": values or VALUES, "angles": places, "radius": 0.02, "rate": rate}
+    folder.mkdir(exist_ok=True)
     log = folder / "log.csv"
     log.write_text("time [s],bend_y [deg]\n0,0\n")
     study = wristctl.load_study(None, "wrist.length=0.095", f"identify.logs=[{log}]", *settings)
@@ -61,6 +67,20 @@ def loop_of(study: Study, command: str) -> Loop:
     section = getattr(study, command.replace("-", "_"))
     loops = getattr(section, "loops", None)
     return loops["rig"] if loops else section.known_loop if command == "hw-run" else section.loop
+
+
+def test_an_identified_wrist_of_three_tendons_is_tried_in_two_planes_on_a_rig_that_has_them(tmp_path: Path) -> None:
+    run = log_run(tmp_path, angles=3)
+    for settings in ((), ("hw-run.planes=2",), ("wrist.tendons=three",), ("hw-run.port=/dev/ttyUSB0",)):
+        study, found = prepared("hw-run", run, *settings).study, known("hw-run", run, *settings)
+        assert study.hw_run.planes == found.hw_run.planes == 2
+        assert len(TendonLayout.of(study.wrist).places) == len(TendonLayout.of(found.wrist).places) == 3
+    with pytest.raises(UserError, match="in one plane"):
+        known("hw-run", run, "hw-run.planes=1")
+    with pytest.raises(UserError, match="3 tendons were identified, and the rig has 4"):
+        known("hw-run", run, "wrist.tendons=four")
+    two = prepared("hw-run", log_run(tmp_path / "two")).study
+    assert (two.hw_run.planes, two.wrist.tendons) == (1, "four"), "which bend in one plane"
 
 
 @pytest.mark.parametrize("rate", [50.0, 100.0000000000003, 200.0])

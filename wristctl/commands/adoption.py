@@ -109,13 +109,13 @@ def with_planes(study: Study) -> Study:
         _entry(REFERENCES, name, *loaded, study)
     planes = REFERENCES[name].planes
     if settings.rig is None and "planes" not in settings.model_fields_set and wound_in_both_planes(study.wrist):
-        return _bending_in(study, 2)
+        return bending_in(study, 2)
     if not settings.planes_are_open:
         if planes > settings.planes:
             problem = f"{name} bends in two planes, and the rig in one"
             raise UserError(problem, "hw-run.planes", "planes: 2")
         return study
-    return _bending_in(study, planes)
+    return bending_in(study, planes)
 
 
 def wound_in_both_planes(wrist: WristParameters) -> bool:
@@ -130,7 +130,7 @@ def wound_in_both_planes(wrist: WristParameters) -> bool:
         return False
 
 
-def _bending_in(study: Study, planes: int) -> Study:
+def bending_in(study: Study, planes: int) -> Study:
     """The study with a rig of so many planes. UserError where other settings do not fit them."""
     try:
         return study.model_copy(update={"hw_run": study.hw_run.bending_in(planes)})

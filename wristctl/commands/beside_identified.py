@@ -6,8 +6,9 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from wristctl.commands.adoption import bending_in, wound_in_both_planes
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import found_in
+from wristctl.commands.inputs_of_loops import Found, found_in, with_found
 from wristctl.config.study import Study
 from wristctl.errors import Phrase, Setting
 from wristctl.study_files.strict_yaml import KeyPath
@@ -43,7 +44,23 @@ def beside_identified(study: Study, section: str, inputs: Inputs, origins: Mappi
         alike = {f"wrist.{key}" for key, value in own.items() if value == getattr(study.wrist, key)}
         kept = [key for key in kept if key not in alike]
     changed: dict[str, Any] = {"kept": tuple(dict.fromkeys(kept))}
-    return study.model_copy(update={name: settings.model_copy(update=changed)})
+    study = study.model_copy(update={name: settings.model_copy(update=changed)})
+    return _wound(study, found) if section == "hw-run" and study.hw_run.rig is None else study
+
+
+def _wound(study: Study, found: Found) -> Study:
+    """The study of a board, real or emulated, that winds the tendons of the wrist that was found: if nobody gave others,
+    and in both planes where these bend in both, if nobody gave planes.
+    """
+    wrist = with_found(study, "hw-run", found).wrist
+    if not wound_in_both_planes(wrist):
+        return study
+    if "planes" not in study.hw_run.model_fields_set:
+        study = bending_in(study, 2)
+    if study.hw_run.planes == 2 and "tendons" not in study.wrist.model_fields_set:
+        study = study.model_copy(update={"wrist": study.wrist.model_copy(update={"tendons": wrist.tendons})})
+        log.info("The rig is taken to have the tendons that %s has found.", found.run)
+    return study
 
 
 def _kept(typed: Sequence[tuple[str, ...]], section: str) -> list[str]:

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.inputs import IDENTIFIED, RATIOS, Inputs, check_sides
+from wristctl.board.messages import AXES
+from wristctl.commands.inputs import IDENTIFIED, RATIOS, Inputs, check_wound
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
@@ -260,7 +261,8 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
         try:
             if study.hw_run.rig is not None:
                 return _on_its_rig(study, found)
-            check_sides(found.wrist, command)
+            check_wound(found.wrist, found.hw_run.planes, command)
+            _check_same_tendons(study, found)
         except UserError as error:
             run = inputs.runs().get("from_identified")
             raise error.at(str(run.path) if run else "from_identified") from error
@@ -275,18 +277,23 @@ def _on_its_rig(study: Study, found: Study) -> Study:
     """An identified wrist on a robot of one's own, whose motors and sensor are as its facts say: a log has the times at
     which its bends were true. UserError where it has other tendons.
     """
-    from wristctl.trial.rig_belief import layout_of_rig
-
-    known, believed = (layout_of_rig(study.hw_run, wrist) for wrist in (study.wrist, found.wrist))
-    assert known is not None and believed is not None
-    if len(known.places) != len(believed.places):
-        what = f"{len(believed.places)} tendons were identified, and the rig has {len(known.places)}"
-        raise UserError(what, "from_identified", "identify a log of this rig: wristctl runs export latest:hw-run")
+    _check_same_tendons(study, found)
     told = {key: getattr(found.hw_run.actuator, key) for key in _OF_TENDONS}
     motors = study.hw_run.actuator.model_copy(update=told)
     return found.model_copy(
         update={"hw_run": found.hw_run.model_copy(update={"actuator": motors, "sensor": study.hw_run.sensor})}
     )
+
+
+def _check_same_tendons(study: Study, found: Study) -> None:
+    """UserError where an identified wrist has another number of tendons than the rig winds."""
+    from wristctl.trial.rig_belief import layout_of_rig
+
+    layouts = [layout_of_rig(study.hw_run, wrist) for wrist in (study.wrist, found.wrist)]
+    known, believed = (len(layout.places) if layout else AXES for layout in layouts)
+    if known != believed:
+        what = f"{believed} tendons were identified, and the rig has {known}"
+        raise UserError(what, "from_identified", "identify a log of this rig: wristctl runs export latest:hw-run")
 
 
 def wrist_identified(inputs: Inputs) -> str:
