@@ -13,6 +13,7 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import session
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_search,
@@ -20,7 +21,6 @@ from wristctl.commands.inputs_of_loops import (
     check_inverses,
     check_reach,
     check_row,
-    identified,
     inverses_of,
     network_for,
     tuned_gains,

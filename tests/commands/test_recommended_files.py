@@ -9,8 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 import wristctl
+from wristctl.commands.identified_wrist import Found, with_found
 from wristctl.commands.identify.command import _problem
-from wristctl.commands.inputs_of_loops import Found, with_found
 from wristctl.commands.recommend.reach import family_of_rigs
 from wristctl.commands.recommend.rehearsals import _asked
 from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of

@@ -14,7 +14,7 @@ import pytest
 from tests.doors.conftest import wristctl
 from tests.doors.test_own_rig import written
 from wristctl.commands.adoption import adopted
-from wristctl.commands.inputs_of_loops import _on_its_rig
+from wristctl.commands.identified_wrist import _on_its_rig
 from wristctl.config.hw_run import HwRunSettings, RigRow
 from wristctl.config.loop import Reference
 from wristctl.config.plant import Actuator

@@ -1,14 +1,12 @@
-"""Inputs of closed loops: network, gains and parameters of earlier runs, and a wrist that does not buckle."""
+"""Inputs of closed loops: network and gains of earlier runs, and a wrist that does not buckle."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from wristctl.board.messages import AXES
-from wristctl.commands.inputs import IDENTIFIED, RATIOS, Inputs, check_wound
+from wristctl.commands.inputs import Inputs
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
@@ -18,7 +16,6 @@ from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, UserError, meant, under
-from wristctl.plain_files import read_json
 from wristctl.records import Run
 
 if TYPE_CHECKING:
@@ -28,9 +25,6 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
-
-# What puts the identified motors and camera into a loop.
-_RIG = "loop.actuator.level=tendon, loop.sensor.level=camera and loop.control_period=0.01 have them"
 
 
 def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None = None) -> None:
@@ -248,62 +242,6 @@ def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop], p
     return at_pose.along
 
 
-def identified(study: Study, command: str, inputs: Inputs) -> Study:
-    """The study with the parameters of the identification among the inputs, as it is without one.
-
-    Raises UserError for a wrist with other tendons than the command bends.
-    """
-    found_by = inputs.read("from_identified", found_in)
-    if found_by is None:
-        return study
-    found = with_found(study, command, found_by)
-    if command == "hw-run":
-        try:
-            if study.hw_run.rig is not None:
-                return _on_its_rig(study, found)
-            check_wound(found.wrist, found.hw_run.planes, command)
-            _check_same_tendons(study, found)
-        except UserError as error:
-            run = inputs.runs().get("from_identified")
-            raise error.at(str(run.path) if run else "from_identified") from error
-    return found
-
-
-# Keys of an actuator that a log tells; the others are of motors, whose facts say them.
-_OF_TENDONS = "tendon_stiffness", "friction", "sheath", "presliding"
-
-
-def _on_its_rig(study: Study, found: Study) -> Study:
-    """An identified wrist on a robot of one's own, whose motors and sensor are as its facts say: a log has the times at
-    which its bends were true. UserError where it has other tendons.
-    """
-    _check_same_tendons(study, found)
-    told = {key: getattr(found.hw_run.actuator, key) for key in _OF_TENDONS}
-    motors = study.hw_run.actuator.model_copy(update=told)
-    return found.model_copy(
-        update={"hw_run": found.hw_run.model_copy(update={"actuator": motors, "sensor": study.hw_run.sensor})}
-    )
-
-
-def _check_same_tendons(study: Study, found: Study) -> None:
-    """UserError where an identified wrist has another number of tendons than the rig winds."""
-    from wristctl.trial.rig_belief import layout_of_rig
-
-    layouts = [layout_of_rig(study.hw_run, wrist) for wrist in (study.wrist, found.wrist)]
-    known, believed = (len(layout.places) if layout else AXES for layout in layouts)
-    if known != believed:
-        what = f"{believed} tendons were identified, and the rig has {known}"
-        raise UserError(what, "from_identified", "identify a log of this rig: wristctl runs export latest:hw-run")
-
-
-def wrist_identified(inputs: Inputs) -> str:
-    """The wrist of the identification among the inputs, in words, by its run; empty without one."""
-    if "from_identified" not in inputs:
-        return ""
-    run = inputs.runs().get("from_identified")
-    return f"the wrist identified in {run.id}" if run else "the identified wrist"
-
-
 def _gains(earlier: Any) -> Gains:
     from wristctl.control.table import read_gains
 
@@ -318,67 +256,6 @@ def _network(earlier: Any) -> Network:
     from wristctl.learning.network_file import NETWORK, load_network
 
     return load_network(earlier.file(NETWORK)) if isinstance(earlier, Run) else earlier.network
-
-
-@dataclass
-class Found:
-    """What an identification has found, and whose run it is."""
-
-    run: str
-    yaml: str
-    """Study file of the wrist; empty where a log told ratios alone."""
-    ratios: Mapping[str, Any] | None = None
-    said: bool = False
-    """Whether a person has been told which settings are whose."""
-    wrist: WristParameters | None = None
-    """The settings by which a log was fitted; None of trials, whose runs have their own."""
-    taken: Sequence[str] = ()
-    """Settings that the study has from these."""
-
-
-def with_found(study: Study, command: str, found: Found) -> Study:
-    """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
-    from wristctl.identification.unknowns import with_identified
-
-    text, told = found.yaml, None
-    if found.ratios is not None:
-        from wristctl.identification.ratios import wrist_by_ratios
-
-        ratios, kept = found.ratios, getattr(study, command.replace("-", "_")).kept
-        if "wrist.stiffness" in kept:
-            ratios = {**ratios, "values": {key: ratio for key, ratio in ratios["values"].items() if key != "force"}}
-        wrist = wrist_by_ratios(ratios, study, found.run)
-        if not found.said:
-            log.info("%s", wrist.said(found.run, kept, found.taken))
-            if command == "simulate" and study.simulate.loop.is_exact:
-                log.info(
-                    "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", _RIG
-                )
-        found.said = True
-        text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
-    known = with_identified(study, command, text)
-    if command != "recommend":
-        return known
-    from wristctl.commands.recommend.own_rig import narrowed
-
-    return narrowed(known, told)
-
-
-def found_in(earlier: Any) -> Found:
-    """What a run or a result of `identify` has found. Raises UserError where that is no wrist."""
-    if not isinstance(earlier, Run):
-        found = Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
-    elif earlier.has(IDENTIFIED):
-        found = Found(earlier.id, earlier.file(IDENTIFIED).read_text(encoding="utf-8"))
-    else:
-        found = Found(earlier.id, "", read_json(earlier.file(RATIOS)) if earlier.has(RATIOS) else None)
-    study = earlier.config if isinstance(earlier, Run) else getattr(earlier, "study", None)
-    if study is not None and study.identify.logs:
-        found.wrist = study.wrist
-    if not found.yaml and found.ratios is None:
-        fix = "an identify run that did not refuse its logs or trials"
-        raise UserError("no wrist was identified there", found.run, fix)
-    return found
 
 
 def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:

@@ -7,8 +7,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import ends_of_family, identified, judged_loops
+from wristctl.commands.inputs_of_loops import ends_of_family, judged_loops
 from wristctl.commands.printed_table import joined
 from wristctl.commands.results import Findings
 from wristctl.commands.study.published import what_changed

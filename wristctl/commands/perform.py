@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Generic
 
 from wristctl.commands.adoption import adopted, with_places, with_presets
-from wristctl.commands.beside_identified import beside_identified
+from wristctl.commands.identified_wrist import beside_identified
 from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
 from wristctl.commands.plain_python import warn_of_plain
 from wristctl.commands.printed_table import Table

@@ -41,7 +41,7 @@ def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
 
 
 def kept_settings() -> Any:
-    """The leaf beside `from_identified` of a section, to which `commands.beside_identified` adds."""
+    """The leaf beside `from_identified` of a section, to which `commands.identified_wrist` adds."""
     return seldom((), "", "settings given beside from_identified, which stay though its run tells them: wrist.damping")
 
 

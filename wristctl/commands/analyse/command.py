@@ -19,13 +19,13 @@ from wristctl.commands.analyse.results import (
     tables_of_margins,
     write,
 )
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverse,
     check_motion,
     check_row,
-    identified,
     network_for,
     planes_of_simulation,
     tuned_gains,

@@ -9,6 +9,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
@@ -18,7 +19,6 @@ from wristctl.commands.inputs_of_loops import (
     check_row,
     compared_inverses,
     family_of,
-    identified,
     judged_loops,
     network_for,
     tuned_gains,

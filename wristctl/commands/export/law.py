@@ -157,7 +157,7 @@ def _of_run(run: Run, controller: str | None, overrides: Sequence[str]) -> tuple
 
 def _with_what_it_had(run: Run, study: Study) -> Study:
     """The study of a run with the wrist and the gains of the runs that it took them from."""
-    from wristctl.commands.inputs_of_loops import found_in, with_found
+    from wristctl.commands.identified_wrist import found_in, with_found
     from wristctl.control.table import controller, read_gains
 
     for earlier in run.manifest.inputs:

@@ -34,7 +34,7 @@ class Exported(NamedTuple):
 def study_of(run: Run) -> tuple[Study, str]:
     """The study of a run with the wrist and motors that it found, or else that its controller knew, and which wrist it
     is, in words."""
-    from wristctl.commands.inputs_of_loops import found_in, with_found
+    from wristctl.commands.identified_wrist import found_in, with_found
 
     sources = [input_run(run, earlier) for earlier in run.manifest.inputs if earlier.role == "from_identified"]
     source = run if run.kind == "identify" else sources[-1] if sources else None

@@ -9,15 +9,9 @@ from typing import TYPE_CHECKING
 from wristctl.commands.adoption import with_planes, wound_in_both_planes
 from wristctl.commands.calibrate.wrist import calibration_in
 from wristctl.commands.hw_run.results import Performed, performed
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import (
-    check_inverse,
-    check_reach,
-    check_row,
-    identified,
-    network_for,
-    tuned_gains,
-)
+from wristctl.commands.inputs_of_loops import check_inverse, check_reach, check_row, network_for, tuned_gains
 from wristctl.commands.live_record import check_live, with_record
 from wristctl.commands.loop_warnings import (
     outside_conditions,

@@ -8,8 +8,9 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, Inputs
-from wristctl.commands.inputs_of_loops import check_searched, identified, why_two_planes
+from wristctl.commands.inputs_of_loops import check_searched, why_two_planes
 from wristctl.commands.kept_studies import gains_content, keep_study, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
 from wristctl.commands.procedure import Procedure

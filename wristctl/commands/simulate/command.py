@@ -8,17 +8,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.identified_wrist import identified, wrist_identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, TUNED, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverse,
     check_motion,
     check_row,
-    identified,
     network_for,
     planes_of_simulation,
     tuned_gains,
-    wrist_identified,
 )
 from wristctl.commands.kept_studies import asked_for, keep_study
 from wristctl.commands.live_record import check_live, listened

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from wristctl.commands import adoption, loop_warnings
 from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
     asked_of_search,
     asked_of_simulation,
     check_row,
-    identified,
     tuned_gains,
 )
 from wristctl.commands.procedure import Procedure, check_tendons, procedure_named

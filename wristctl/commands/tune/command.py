@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, NETWORK, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_search,
@@ -15,7 +16,6 @@ from wristctl.commands.inputs_of_loops import (
     check_reach,
     check_searched,
     family_of,
-    identified,
     inverses_of,
     judged_loops,
     network_for,

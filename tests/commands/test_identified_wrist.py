@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 import wristctl
+from wristctl.commands.identified_wrist import found_in, identified, with_found
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import found_in, identified, with_found
 from wristctl.commands.perform import Prepared, prepare, study_with
 from wristctl.commands.procedure import procedure_named
 from wristctl.config.loop import Loop
