@@ -54,6 +54,22 @@ def test_gains_that_are_given_twice_at_once_are_refused_with_their_line(tmp_path
         load_study([file])
 
 
+@pytest.mark.parametrize("command", ["simulate", "hw-run", "analyse"])
+@pytest.mark.parametrize("apart", ["gains=default", "gains.Kp=2.0"])
+def test_gains_typed_with_a_controller_and_apart_from_it_are_refused_and_those_of_a_file_give_way(
+    command: str, apart: str, tmp_path: Path
+) -> None:
+    for given in (["controller=pid/printed", apart], [apart, "controller=pid/printed"]):
+        with pytest.raises(UserError, match="has its gains with it, and others are given too"):
+            load_study([], given, command)
+    with pytest.raises(UserError, match="has its gains with it, and others are given too"):
+        read_study(command=command, keywords={"controller": "pid/printed", "gains": "default"})
+    file = tmp_path / "study.yaml"
+    file.write_text("simulate: {controller: pid/printed}\n")
+    assert load_study([file], ["simulate.gains=default"]).simulate.gains == "default"
+    assert load_study([], ["controller=pid/printed", "controller=pid/default"], "simulate").simulate.gains == "default"
+
+
 def test_one_controller_takes_the_place_of_a_trials_list_with_its_gains_for_hardware(tmp_path: Path) -> None:
     assert rows_of() == [("smc-tracking", "hardware")]
     assert rows_of("controller=ct-dob") == [("ct-dob", "hardware")]

@@ -30,7 +30,7 @@ from wristctl.study_files.renaming import (
 )
 from wristctl.study_files.resolved import check_mode, check_read, key_below
 from wristctl.study_files.shipped import shipped_name, shipped_names, studies_beside, study_file
-from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
+from wristctl.study_files.short_rows import GainsGiven, for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.study_files.typed_controllers import named_in, put_in
 
@@ -83,7 +83,7 @@ def read_study(
     """
     data: dict[str, Any] = {} if base is None else base.model_dump(by_alias=True, exclude_unset=True)
     origins: dict[KeyPath, Phrase] = {}
-    former = NewNames()
+    former, gains_given = NewNames(), GainsGiven()
     for file in files:
         path = study_file(file)
         if path is None:
@@ -96,9 +96,12 @@ def read_study(
     leave_out_removed(data, origins)
     for override in overrides:
         setting = Setting(override) if isinstance(override, str) else override
-        _merge(data, _today(_override(setting, command), setting, None, former), setting, origins)
+        whole = _override(setting, command)
+        today = _today(whole, setting, None, former)
+        gains_given.note(whole.data, today.data, setting)
+        _merge(data, today, setting, origins)
     for name, value in keywords.items():
-        _merge_keyword(data, origins, name, value, command or "", former)
+        _merge_keyword(data, origins, name, value, command or "", former, gains_given)
     with_loops_of_today(data, origins, former)
     put_in(data, origins, controllers, command or "", tune)
     note_presets(data, origins, former)
@@ -184,8 +187,9 @@ def _merge_file(
 
 
 def _merge_keyword(
-    data: dict[str, Any], origins: dict[KeyPath, Phrase], name: str, value: Any, command: str, former: NewNames
-) -> None:
+    data: dict[str, Any], origins: dict[KeyPath, Phrase], name: str, value: Any, command: str, former: NewNames,
+    gains_given: GainsGiven,
+) -> None:  # fmt: skip
     """An argument of a command's function: a section, a key of the command's own, or the wrist of a study file."""
     where, path = keyword(name, value, command), path_of(name, command)
     if name == "wrist" and isinstance(value, str | Path):
@@ -194,7 +198,9 @@ def _merge_keyword(
     whole = in_full(as_a_file_has_it(value, where), path)
     for key in reversed(path):
         whole = {key: whole}
-    _merge(data, _today(Document(whole, {}), where, None, former), where, origins)
+    today = _today(Document(whole, {}), where, None, former)
+    gains_given.note(whole, today.data, where)
+    _merge(data, today, where, origins)
 
 
 def _merge_wrist(

@@ -1,6 +1,7 @@
 """A controller with its gains as it may be given in short: NAME or NAME/GAINS, and one in place of a list of them."""
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from wristctl.config.controller_row import BY_LOOP, Row
@@ -40,6 +41,33 @@ def _apart(data: Any, path: KeyPath, lines: dict[KeyPath, int], place: Phrase) -
     if key in lines:
         lines[*path, "gains"] = lines[key]
     return data | parts.groupdict()
+
+
+class GainsGiven:
+    """Where gains were typed, with their controller or apart from it: later ones win, but never over both at once."""
+
+    def __init__(self) -> None:
+        self._with: dict[KeyPath, bool] = {}
+
+    def note(self, before: Any, after: Any, where: Phrase) -> None:
+        """Note what one override or argument gives, before and after its gains were taken from its controller's name.
+
+        Raises UserError where an earlier one gives the same gains in the other way.
+        """
+        apart = set(_places_of_gains(before, ()))
+        for path in _places_of_gains(after, ()):
+            if self._with.setdefault(path, path not in apart) is not (path not in apart):
+                raise UserError(
+                    "the controller has its gains with it, and others are given too", where, "give them once"
+                )
+
+
+def _places_of_gains(data: Any, path: KeyPath) -> Iterator[KeyPath]:
+    for key, value in data.items() if isinstance(data, dict) else ():
+        if key == "gains":
+            yield (*path, key)
+        else:
+            yield from _places_of_gains(value, (*path, key))
 
 
 def row_typed(name: str) -> dict[str, str]:
