@@ -27,14 +27,17 @@ from wristctl.commands.inputs_of_loops import (
     tuned_on,
 )
 from wristctl.commands.loop_warnings import warn_if_it_buckles, warn_if_outside, warn_of_loops
+from wristctl.commands.procedure import procedure_named
 from wristctl.commands.results import Findings
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
+from wristctl.control.table import controller
 from wristctl.errors import UserError
 from wristctl.simulation import worlds
 from wristctl.simulation.planes import Asked
+from wristctl.study_files.load import read_study
 from wristctl.wrist import statics
 
 STUDY = wristctl.load_study(None)
@@ -122,6 +125,24 @@ def test_gains_and_parameters_in_memory_are_those_of_their_results() -> None:
         ratios: Any = nothing
         with pytest.raises(UserError, match="no wrist was identified"):
             identified(STUDY, "simulate", Inputs({"from_identified": ratios}))
+
+
+@pytest.mark.parametrize("command", ["simulate", "analyse", "compare", "hw-run"])
+def test_gains_of_a_tune_run_that_no_row_takes_are_warned_of(command: str, caplog: pytest.LogCaptureFixture) -> None:
+    kp, ki, kd = controller("pid").gains
+    tuned: Any = SimpleNamespace(gains={"pid": {kp: 10.0, ki: 2.0, kd: 0.1}}, study=STUDY, run=None)
+    for gains, warned in (("tuned", False), ("printed", True)):
+        rows = f"controllers=[{{controller: pid, gains: {gains}}}]"
+        row = rows if command == "compare" else f"controller=pid/{gains}"
+        study = read_study(overrides=[row], command=command)[0]
+        caplog.clear()
+        procedure_named(command).plan(study, Inputs({"tuned": tuned}))
+        assert ("takes the gains of the tune run" in caplog.text) is warned
+        caplog.clear()
+        if not warned:
+            continue
+        procedure_named(command).plan(study, Inputs())
+        assert not caplog.text
 
 
 def test_tips_outside_are_warned_of_in_percent(caplog: pytest.LogCaptureFixture) -> None:

@@ -196,6 +196,12 @@ def check_inverse(reference: Reference, inputs: Inputs) -> None:
         log.warning("the reference does not go through the network that is given: that takes inverse: network")
 
 
+def check_tuned(rows: Iterable[Row | SimulateSettings], inputs: Inputs) -> None:
+    """Warn of a tune run among the inputs whose gains no row takes."""
+    if "tuned" in inputs and not any(row.gains == "tuned" for row in rows):
+        log.warning("no controller takes the gains of the tune run that is given: that takes gains: tuned")
+
+
 def inverses_of(references: Iterable[Reference]) -> set[str]:
     """Inverses that turn the tip targets of these references into angles."""
     return {reference.inverse for reference in references}

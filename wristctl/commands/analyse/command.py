@@ -26,6 +26,7 @@ from wristctl.commands.inputs_of_loops import (
     check_inverse,
     check_motion,
     check_row,
+    check_tuned,
     network_for,
     planes_of_simulation,
     tuned_gains,
@@ -67,6 +68,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_tuned([chosen], inputs)
         check_motion(known, planes)
         check_inverse(chosen.reference, inputs)
         looks_back(smooth(chosen.loop, settings.friction))

@@ -17,6 +17,7 @@ from wristctl.commands.inputs_of_loops import (
     check_inverses,
     check_reach,
     check_row,
+    check_tuned,
     compared_inverses,
     family_of,
     judged_loops,
@@ -151,6 +152,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         if row.gains != "tuned" or row.controller not in found_here:
             with under(f"compare.controllers.{number}"):
                 check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
+    check_tuned(settings.rows, inputs)
     if settings.tuning is not None:
         check_family_reach(study, settings.tuning.worlds.family)
         with under("compare.tuning"):

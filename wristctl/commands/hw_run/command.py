@@ -11,7 +11,14 @@ from wristctl.commands.calibrate.wrist import calibration_in
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.identified_wrist import identified
 from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import check_inverse, check_reach, check_row, network_for, tuned_gains
+from wristctl.commands.inputs_of_loops import (
+    check_inverse,
+    check_reach,
+    check_row,
+    check_tuned,
+    network_for,
+    tuned_gains,
+)
 from wristctl.commands.live_record import check_live, with_record
 from wristctl.commands.loop_warnings import (
     outside_conditions,
@@ -41,6 +48,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.controllers.{number}"):
             check_row(row, tuned)
+    check_tuned(settings.rows, inputs)
     found = identified(study, "hw-run", inputs)
     known = found.wrist
     with under("hw-run"):

@@ -15,6 +15,7 @@ from wristctl.commands.inputs_of_loops import (
     check_inverse,
     check_motion,
     check_row,
+    check_tuned,
     network_for,
     planes_of_simulation,
     tuned_gains,
@@ -47,6 +48,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_tuned([settings], inputs)
         check_live(settings.reference, [settings.controller], known.wrist, sample_period(settings.loop.control_period))
         if not settings.reference.is_live:
             check_motion(known, planes)
