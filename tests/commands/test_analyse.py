@@ -137,6 +137,7 @@ def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault(
     said = done.answer.sentence
     assert "smc/exchanged is UNSTABLE at 0, 15 and 30 deg" in said and "stable up to" in said
     assert done.fault is not None and done.fault.exit_code == 3 and "0, 15 and 30 deg" in done.fault.what
+    assert done.marks == ["unstable at 0, 15 and 30 deg"], "which the run's page shows in place of ok"
     assert math.isnan(done.metrics["delay_margin"]) and done.metrics["growth"] > 1e3
     assert [row[1:] for row in done.answer.table.rows] == 3 * [5 * (None,)]
     assert "UNSTABLE" in done.summary[0] and "stable up to" in " ".join(done.summary)
@@ -147,7 +148,7 @@ def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault(
 def test_a_wrist_that_buckles_needs_some_gain_to_stay(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         done = analyse(PID, "wrist.hand_mass=0.9", STRAIGHT)
-    assert done.fault is None and 0.0 < done.metrics["gain_least"] < 0.1 and "buckles" in caplog.text
+    assert done.fault is None and not done.marks and 0.0 < done.metrics["gain_least"] < 0.1 and "buckles" in caplog.text
     assert f"{done.metrics['gain_least']:.3g} times" in " ".join(done.summary[1:])
     alone = analyse("simulate={controller: feedforward, gains: default}", "wrist.hand_mass=0.9", STRAIGHT)
     assert "and it is UNSTABLE" in alone.answer.sentence and alone.fault is not None

@@ -125,9 +125,19 @@ class Analysed(StudyResult):
         return answer_of(self.label, self.records(), self.found, self.place)
 
     @property
+    def marks(self) -> list[str]:
+        """The angles at which the loop is unstable."""
+        bad = self._unstable_at
+        return [f"unstable at {listed(bad)}"] * bool(bad)
+
+    @property
+    def _unstable_at(self) -> list[float]:
+        return [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
+
+    @property
     def fault(self) -> UserError | None:
         """Error that names the angles at which the loop is unstable; None where it is stable."""
-        bad = [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
+        bad = self._unstable_at
         if not bad:
             return None
         fix = "look at the figures; try other gains, or a shorter control_period"
