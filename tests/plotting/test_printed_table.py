@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 
-from wristctl.commands.printed_table import Table, number
+from wristctl.commands.printed_table import Table, number, two
 
 FOUR = Table("", ("name", "ab", "cdef", "g"), [("smc", 1, 2, 3), ("pid", 4, 5, 6)])
 """Columns of widths 4, 2, 4 and 1, two blanks between them: 17 all together."""
@@ -73,3 +74,9 @@ def test_numbers_have_four_digits(value: float, shown: str) -> None:
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
 def test_what_is_no_number_is_a_dash(value: float) -> None:
     assert number(value) == "-"
+
+
+@pytest.mark.parametrize("told", [number, two])
+def test_what_rounding_leaves_of_nothing_is_0_and_small_quantities_are_themselves(told: Callable[[float], str]) -> None:
+    assert [told(value) for value in (-0.0, 2.8e-107, -3e-31, 0.0)] == ["0"] * 4
+    assert float(told(-2.5e-12)) == -2.5e-12 and float(told(6.6e-27)) == 6.6e-27
