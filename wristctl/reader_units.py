@@ -13,6 +13,15 @@ _NUMBER = r"-?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?"
 _IN_WORDS = re.compile(rf"{_NUMBER}(?: to {_NUMBER})?")
 
 
+# Size below which a number is what rounding has left of 0.
+_DUST = 1e-30
+
+
+def without_dust(value: float) -> float:
+    """The value, or 0 without a sign where it is smaller than anything that is meant."""
+    return 0.0 if abs(value) < _DUST else value
+
+
 def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
     """A number, also in words, or a range of two, and its unit for people: angles, and their integrals, in degrees.
 

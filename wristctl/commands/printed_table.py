@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.escape import printable
-from wristctl.reader_units import readable
+from wristctl.reader_units import readable, without_dust
 
 if TYPE_CHECKING:
     from wristctl.comparison.tie_groups import Share
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 # Letters of a line of a head that is broken, at least; digits of a number from which it is printed as it is.
 _HEAD, _DIGITS = 11, 4
-# Size below which a number is what rounding has left of 0.
-_DUST = 1e-30
 
 
 @dataclass(frozen=True)
@@ -101,12 +99,7 @@ class Table:
 
 def number(value: float) -> str:
     """Four significant digits; infinities and NaN as a dash, and what rounding has left of nothing as 0."""
-    return f"{_without_dust(value):.4g}" if math.isfinite(value) else "-"
-
-
-def _without_dust(value: float) -> float:
-    """The value, or 0 without a sign where it is smaller than anything that is meant."""
-    return 0.0 if abs(value) < _DUST else value
+    return f"{without_dust(value):.4g}" if math.isfinite(value) else "-"
 
 
 def _cell(value: Any, digits: int, is_angle: bool) -> str:
@@ -166,7 +159,7 @@ def capital(text: str) -> str:
 
 def two(value: float, digits: int = 2) -> str:
     """A number to two digits (or so many), as short as it goes: 15000, 0.012, 3.1e-5."""
-    shown = f"{_without_dust(value):.{digits}g}"
+    shown = f"{without_dust(value):.{digits}g}"
     if "e+" in shown and abs(value) < 1e6:
         return f"{float(shown):.0f}"
     mantissa, _, power = shown.partition("e")

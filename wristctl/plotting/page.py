@@ -17,7 +17,7 @@ from wristctl.escape import printable, printable_lines
 from wristctl.plain_files import read_plain, unreadable
 from wristctl.plotting.animation import animation
 from wristctl.plotting.page_tables import shown_tables
-from wristctl.reader_units import in_degrees, metric_in_words
+from wristctl.reader_units import in_degrees, metric_in_words, without_dust
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, read_overview
 from wristctl.records.run import Run
@@ -276,7 +276,7 @@ def _cell(value: Any, head: Any = "") -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.4g}" if math.isfinite(value) else "-"
+        return f"{without_dust(value):.4g}" if math.isfinite(value) else "-"
     return str(value)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator
 
 from wristctl.comparison.bootstrap import penalised
 from wristctl.comparison.controller_ranking import Ranking, labels_of, probability_of_less
@@ -64,7 +63,6 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0.0)
     logarithmic(axes.xaxis)
-    axes.tick_params(axis="x", which="minor", labelbottom=False)
     wide = picture.get_figwidth() >= _ROOM
     axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval" if wide else "RMSE [deg], 95 % interval")
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
@@ -175,8 +173,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
             dots.append(Dot(height, 1.0 / inverse.value, shade, ends, scores[row] / scores[base], mark))
         draw_dots(panel, dots, size=3.5)
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
-        logarithmic(panel.xaxis)
-        panel.xaxis.set_major_locator(LogLocator(numticks=3))
+        logarithmic(panel.xaxis, most=3)
         panel.minorticks_off()
         title(panel, places[ranking.name])
     panels[0].set_yticks(range(len(labels)), [_called(label) for label in labels])

@@ -3,6 +3,7 @@
 Figures are made without pyplot, so drawing leaves no state behind and needs no display.
 """
 
+import math
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from wristctl.config.former_names import label_today
@@ -172,20 +173,46 @@ def undress(axes: Axes) -> None:
 class PowersOfTen(LogFormatterSciNotation):
     """Powers of ten such as 10⁻³ as plain text: to parse them as formulas takes longer than to draw all the rest."""
 
+    def __init__(self) -> None:
+        super().__init__(minor_thresholds=(math.inf, math.inf))  # every tick of its locator has a number
+
     def __call__(self, x: float, pos: int | None = None) -> str:
+        if 1e-3 <= x < 1e5 and not np.isclose(np.log10(x) % 1.0, (0.0, 1.0), atol=1e-9).any():
+            return f"{x:g}"
         formula: str = super().__call__(x, pos)
         plain = formula.replace(r"$\mathdefault{", "").replace(r"\times", "\u00d7").replace("}$", "").rstrip("}")
         base, _, power = plain.removesuffix("\u00d710^{0").partition("^{")
         return base + power.translate(_RAISED)
 
 
-def logarithmic(axis: Axis, steps: Sequence[float] = ()) -> None:
-    """Give an axis a logarithmic scale in powers of ten, or of plain numbers with these steps within a decade."""
+class Numbered(LogLocator):
+    """Powers of ten; where fewer than two are in sight, 1, 2 and 5 times these, or round numbers of a narrow range."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        low, high = sorted((vmin, vmax))
+        if low <= 0.0 or not math.isfinite(high):
+            return super().tick_values(vmin, vmax)
+        first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+        powers = [10.0**power for power in range(first, last + 1)]
+        if len(_within(powers, low, high)) >= 2:
+            return super().tick_values(vmin, vmax)
+        steps = _within([step * power for power in powers for step in (1.0, 2.0, 5.0)], low, high)
+        return steps if len(steps) >= 2 else _within(MaxNLocator(3).tick_values(low, high), low, high)
+
+
+def _within(places: Sequence[float], low: float, high: float) -> list[float]:
+    return [place for place in places if low <= place <= high]
+
+
+def logarithmic(axis: Axis, steps: Sequence[float] = (), most: int | None = None) -> None:
+    """Give an axis a logarithmic scale in powers of ten, or of plain numbers with these steps within a decade.
+
+    At least two of its ticks have numbers, of powers of ten at most `most`.
+    """
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
-    if steps:
-        axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_locator(LogLocator(subs=steps) if steps else Numbered(numticks=most))
     axis.set_major_formatter("{x:g}" if steps else PowersOfTen())
-    axis.set_minor_formatter(NullFormatter() if steps else PowersOfTen())
+    axis.set_minor_formatter(NullFormatter())
 
 
 def title(axes: Axes, text: str) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import plain
@@ -82,13 +81,7 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
         draw_dots(panels[term_value.family], [dot], 3.0)
     for family, panel in panels.items():
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
-        logarithmic(panel.xaxis)
-        panel.xaxis.set_minor_formatter(NullFormatter())
-        low, high = panel.get_xlim()
-        if high < 30.0 * low:
-            logarithmic(panel.xaxis, (1.0, 2.0, 5.0) if high < 8.0 * low else (1.0, 3.0))
-        else:
-            panel.xaxis.set_major_locator(LogLocator(numticks=3))
+        logarithmic(panel.xaxis, most=3)
         title(panel, _short(family))
     name_rows(every[0], terms)
     label = "times less RMSE, with 95 % interval; grey: cannot be told"
