@@ -205,9 +205,9 @@ def _within(places: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def logarithmic(axis: Axis, steps: Sequence[float] = (), most: int | None = None) -> None:
-    """Give an axis a logarithmic scale in powers of ten, or of plain numbers with these steps within a decade.
+    """Give an axis a logarithmic scale in powers of ten, at most `most` of them, or of these steps within a decade.
 
-    At least two of its ticks have numbers, of powers of ten at most `most`.
+    Without steps at least two of its ticks have numbers.
     """
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
     axis.set_major_locator(LogLocator(subs=steps) if steps else Numbered(numticks=most))
