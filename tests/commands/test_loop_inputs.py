@@ -206,3 +206,16 @@ def test_the_study_of_all_laws_refuses_a_tip_that_a_familys_wrist_does_not_reach
     with pytest.raises(UserError) as caught:
         FAIR_STUDY.plan(given, Inputs())
     assert caught.value.where == "families.f.references.1.tips"
+
+
+@pytest.mark.parametrize("kind", ["minimum-jerk", "circumduction"])
+def test_a_horizon_of_few_control_periods_is_refused_and_the_least_is_none_of_them(kind: str) -> None:
+    def planned(horizon: float) -> str:
+        settings = [f"simulate.reference={{kind: {kind}}}", f"simulate.horizon={horizon}"]
+        return procedure_named("simulate").plan(wristctl.load_study(None, *settings), Inputs())
+
+    for short in (5e-4, 3e-3, 4.9e-3):
+        with pytest.raises(UserError, match="fewer than 5 control periods"):
+            planned(short)
+    for enough in (5e-3, 0.01, 0.013):
+        assert f"{enough:g} s" in planned(enough)

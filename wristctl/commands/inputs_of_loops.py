@@ -171,7 +171,7 @@ def check_motion(study: Study, planes: int) -> None:
         check_reach([chosen.reference], study.wrist, "reference")
     else:
         by_bends = chosen.model_copy(update={"reference": by_angles(chosen.reference)})
-        asked_of(study.model_copy(update={"simulate": by_bends}), _CHECKED)
+        asked_of(study.model_copy(update={"simulate": by_bends}), min(_CHECKED, chosen.horizon / 4.0))
 
 
 def why_two_planes(wrist: WristParameters, asked: Iterable[Asked], which: str = "") -> str:

@@ -49,11 +49,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_tuned([settings], inputs)
+        check_size(size(study), planes=planes)
         check_live(settings.reference, [settings.controller], known.wrist, sample_period(settings.loop.control_period))
         if not settings.reference.is_live:
             check_motion(known, planes)
         check_inverse(settings.reference, inputs)
-        check_size(size(study), planes=planes)
     times, where = size(study).rollouts, " in two planes" * (planes == 2)
     truth = truth_told(known.wrist, {"simulate": settings.loop})
     return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{where}{truth}"
