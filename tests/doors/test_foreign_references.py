@@ -54,6 +54,14 @@ def test_what_shows_only_later_ends_the_run_and_is_named(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("growing", ["time", "-np.exp(30.0 * time)"])
+def test_a_course_beyond_the_range_of_the_wrist_is_refused_and_no_bug(tmp_path: Path, growing: str) -> None:
+    (tmp_path / "own.py").write_text(OWN.replace("COURSE", f"np.array([9.0 * {growing}, 0.0 * time, 0.0 * time])"))
+    done = wristctl(tmp_path, "simulate", "--set", "simulate.reference.kind=own.py:OWN", "--set", "simulate.horizon=1")
+    assert done.returncode == 2 and "beyond the wrist's range of 50 deg" in done.stderr, done.stderr
+
+
+@pytest.mark.slow
 def test_a_sound_one_runs(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN.replace("COURSE", SOUND))
     given = ("--set", "simulate.reference.kind=own.py:OWN", "--set", "simulate.horizon=1")

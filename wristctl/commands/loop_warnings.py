@@ -310,6 +310,9 @@ def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | N
         return f"tensions of {wrist.tension_limit:g} N {held}", fix
     facing, loop = loop_facing(wrist, asked.loop, asked.direction)
     theta = motion(reference, facing, asked.horizon, period).theta_ref
+    if (most := math.degrees(float(abs(theta).max()))) > wrist.range_deg * (1.0 + 1e-12):
+        problem = f"{reference.kind} asks for {most:.3g} deg, beyond the wrist's range of {wrist.range_deg:g} deg"
+        raise UserError(problem, "reference", "other parameters of it, a smaller angle_deg, or widen wrist.range_deg")
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
     short = shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
     if short is None:
