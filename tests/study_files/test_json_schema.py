@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Literal, get_origin
 
@@ -136,6 +137,26 @@ def test_what_commands_refuse_it_refuses(
 )  # fmt: skip
 def test_short_forms_are_taken(validator: Draft202012Validator, text: str) -> None:
     assert refused(validator, text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "taken"),
+    [
+        *((f"{section}: {{controllers: pid}}", True) for section in ("compare", "tune", "hw-run", "recommend")),
+        ("hw-run: {controllers: pid-ff/hardware}", True), ("compare: {references: sine}", True),
+        ("compare: {directions: radial}", True), ("hw-run: {directions: radial}", True),
+        ("study: {families: camera}", True), ("identify: {logs: a.csv}", True), ("tune: {scenarios: camera}", False),
+        ("wrist: {tendons: 0}", False), ("analyse: {angles_deg: a}", False), ("compare: {controllers: pdi}", False),
+    ],
+)  # fmt: skip
+def test_a_name_is_a_list_of_one_where_the_items_of_a_list_are_names(
+    validator: Draft202012Validator, text: str, taken: bool, tmp_path: Path
+) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text(text)
+    with nullcontext() if taken else pytest.raises(UserError):
+        load_study([file])
+    assert (refused(validator, text) == []) is taken
 
 
 def test_an_editor_shows_unit_meaning_range_and_choices() -> None:

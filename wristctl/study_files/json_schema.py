@@ -42,6 +42,9 @@ def study_schema() -> dict[str, Any]:
         for named_by in NAMED_BY:
             if named_by in section.get("properties", ()):
                 sections[name] = {"anyOf": [section["properties"][named_by], section]}
+    for section in sections.values():
+        for leaf in section.get("properties", section.get("anyOf", [{}])[-1].get("properties", {})).values():
+            _or_alone(leaf, schema)
     sections["TendonPlace"] = {"anyOf": [{"type": "number"}, sections["TendonPlace"]]}
     include = {"type": "array", "items": {"type": "string"}, "description": "study files that are read before this one"}
     schema["properties"] = {"include": include} | schema["properties"]
@@ -57,6 +60,23 @@ def _for_editors(leaf: dict[str, Any]) -> dict[str, Any]:
     words += [f"(default: {leaf['source']})" if leaf.get("source") else ""]
     text = re.sub(r"\s+", " ", " ".join(filter(None, words)))
     return kept | ({"description": text} if text else {})
+
+
+def _or_alone(leaf: dict[str, Any], schema: dict[str, Any]) -> None:
+    """Let a name stand for a list of one, where the items of a list are names."""
+    if leaf.get("type") == "array" and _takes_a_name(leaf.get("items", {}), schema):
+        of_list = {key: leaf.pop(key) for key in list(leaf) if key not in ("description", "default")}
+        leaf["anyOf"] = [of_list, of_list["items"]]
+
+
+def _takes_a_name(item: dict[str, Any], schema: dict[str, Any]) -> bool:
+    if "$ref" in item:
+        whole: Any = schema
+        for key in item["$ref"].removeprefix("#/").split("/"):
+            whole = whole[key]
+        return _takes_a_name(whole, schema)
+    parts = item.get("anyOf", item.get("oneOf", ()))
+    return item.get("type") == "string" or any(_takes_a_name(part, schema) for part in parts)
 
 
 def _short_rows(part: Any, rows: set[str]) -> None:

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from wristctl.config.controller_row import Row
 from wristctl.config.section import Section
@@ -50,12 +51,28 @@ def in_full(value: Any, path: KeyPath) -> Any:
     """A text where a list of names stands, or a group with a `kind` or a `level`, as such a list or group."""
     if not isinstance(value, str):
         return value
-    kind, (item, fields) = field_at(path)[0], (field_at((*path, 0))[0], keys_of(field_at(path)[0]))
-    if named := [name for name in NAMED_BY if name in fields]:
-        return {named[0]: value}
+    kind = field_at(path)[0]
+    if named := _named_by(kind):
+        return {named: value}
+    if get_origin(kind) is not tuple:
+        return value
+    item = field_at((*path, 0))[0]
+    if named := _named_by(item):
+        return ({named: value},)
+    return (value,) if is_name(item) else value
+
+
+def _named_by(kind: Any) -> str | None:
+    """The leaf for which a group's name alone stands; None where there is none."""
+    return next((name for name in NAMED_BY if name in keys_of(kind)), None)
+
+
+def is_name(item: Any) -> bool:
+    """Whether an item of a list is given by a name: a text, one of some choices, or a controller's row."""
     item = get_args(item)[0] if get_origin(item) is Annotated else item
-    of_names = item in (str, Row) or get_origin(item) is Literal
-    return (value,) if get_origin(kind) is tuple and of_names else value
+    if get_origin(item) in (Union, UnionType):
+        return all(map(is_name, get_args(item)))
+    return item is str or get_origin(item) is Literal or (isinstance(item, type) and issubclass(item, Row))
 
 
 def as_a_file_has_it(value: Any, where: Keyword) -> Any:
