@@ -29,6 +29,7 @@ COMMANDS = (
     "train",
     "tune",
     "compare",
+    "study",
     "recommend",
     "simulate",
     "analyse",

@@ -262,9 +262,20 @@ def test_help_names_every_key_that_a_function_takes() -> None:
     for name, keys in (
         ("simulate", {"controller", "loop", "sweep", "wrist"}),
         ("hw_run", {"payload", "planes", "seed"}),
+        ("study", {"controllers", "families", "budgets", "wrist"}),
     ):
         told = (getattr(wristctl, name).__doc__ or "").partition("Keys: ")[2].partition(";")[0]
         assert keys <= set(told.replace("\n", " ").split(", "))
+
+
+def test_a_study_of_controllers_takes_its_keys_as_arguments() -> None:
+    """Each reaches its setting: what is refused of it is named by it."""
+    with pytest.raises(UserError, match=r"pdi.* - study\(controllers=.* did you mean 'pid'"):
+        wristctl.study(controllers=["pid", "pdi"])
+    with pytest.raises(UserError, match=r"unknown family of worlds 'camera' - study\(families="):
+        wristctl.study(controllers="pid", families=["camera"], wrist={"length": 0.095})
+    with pytest.raises(UserError, match=r"unknown argument 'controler' - study\("):
+        wristctl.study(controler="pid")  # type: ignore[call-arg]
 
 
 def test_the_types_of_arguments_are_those_of_the_schema() -> None:

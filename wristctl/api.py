@@ -67,6 +67,7 @@ if TYPE_CHECKING:
         IdentifyArguments,
         RecommendArguments,
         SimulateArguments,
+        StudyArguments,
         TrainArguments,
         TuneArguments,
     )
@@ -177,8 +178,9 @@ def compare(
 
 @in_python()
 def study(
-    study: StudyOrFile, *, resume: Ref | None = None, executor: str = "serial", out: Folder | None = None,
-    label: str = "", progress: Watch | None = None,
+    study: StudyOrFile | None = None, *, resume: Ref | None = None, executor: str = "serial",
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    **settings: Unpack[StudyArguments],
 ) -> Studied:  # fmt: skip
     """Every law tuned and judged at equal budget on families of worlds, by the study's `study` section.
 
@@ -187,8 +189,9 @@ def study(
     `.frame()` is a row per family and law. With a folder `out` it is also a sealed run directory there, `label` part of
     its name; `progress(what, count, total, figures)` is called. Raises UserError for unknown laws or families, and for
     workers that compute other numbers or are gone.
+    `settings` are sections or keys of a study, on top of `study`.
     """
-    return carry_out(FAIR_STUDY, study, {"resume": resume}, out, label, progress, executor)
+    return carry_out(FAIR_STUDY, study, {"resume": resume}, out, label, progress, executor, settings)
 
 
 @in_python()
@@ -383,5 +386,5 @@ def _say_keys(function: Callable[..., Any]) -> None:
     function.__doc__ = f"{inspect.getdoc(function)}\n\n{told}"
 
 
-for _function in (gen_data, train, tune, compare, recommend, simulate, analyse, identify, hw_run):
+for _function in (gen_data, train, tune, compare, study, recommend, simulate, analyse, identify, hw_run):
     _say_keys(_function)

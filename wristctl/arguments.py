@@ -243,6 +243,23 @@ class CompareArguments(SharedArguments, total=False):
     sweep: Sequence[str]
 
 
+class StudyArguments(SharedArguments, total=False):
+    """Keywords of `study`."""
+
+    controllers: Sequence[str]
+    families: Sequence[str]
+    presets: Sequence[RowKeys | str]
+    terms: Mapping[str, Sequence[str]]
+    optimiser: str
+    objective: Mapping[str, Any]
+    tolerated: float
+    variants: Mapping[str, Mapping[str, Any]]
+    varied: str
+    budget: str
+    budgets: Mapping[str, Mapping[str, Any]]
+    controller_settings: Mapping[str, Mapping[str, float]]
+
+
 class RecommendArguments(SharedArguments, total=False):
     """Keywords of `recommend`."""
 
