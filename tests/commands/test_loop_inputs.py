@@ -208,6 +208,16 @@ def test_the_study_of_all_laws_refuses_a_tip_that_a_familys_wrist_does_not_reach
     assert caught.value.where == "families.f.references.1.tips"
 
 
+def test_samples_of_another_wrist_than_the_study_gives_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    """What a study does not say of its wrist is no other wrist."""
+    made = wristctl.gen_data(None, samples=40, wrist={"length": 0.095})
+    for given, warned in (((), False), (("wrist.length=0.095",), False), (("wrist.length=0.07",), True)):
+        caplog.clear()
+        procedure_named("train").plan(wristctl.load_study(None, *given), Inputs({"data": made}))
+        assert ("wrist.length is 0.095 there and 0.07 here" in caplog.text) is warned
+        assert bool(caplog.text) is warned
+
+
 @pytest.mark.parametrize("kind", ["minimum-jerk", "circumduction"])
 def test_a_horizon_of_few_control_periods_is_refused_and_the_least_is_none_of_them(kind: str) -> None:
     def planned(horizon: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import shutil
 import time
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from wristctl.learning.selection import Choice
     from wristctl.learning.training_result import Job, TrainingResult
     from wristctl.learning.transitions import Transitions
+
+log = logging.getLogger(__name__)
 
 
 CHECKPOINTS = "checkpoints"
@@ -182,6 +185,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     if samples is None and study.gen_data.measured:
         samples = drawn(study, (0, 0), recorded(study, Inputs()))
     if samples is not None:
+        _warn_of_another_wrist(study, inputs)
         run = inputs.runs().get("data")
         count, held_out = len(samples.targets), samples.held_out
         source = run.id if run else "those given" if "data" in inputs else source
@@ -207,6 +211,19 @@ def plan(study: Study, inputs: Inputs) -> str:
             *shares,
         ]
     )
+
+
+def _warn_of_another_wrist(study: Study, inputs: Inputs) -> None:
+    """Warn of samples of a wrist that is not as the study says: a network learns theirs."""
+    source = inputs.get("data")
+    if source is None:
+        return
+    theirs = (source.config if isinstance(source, Run) else source.study).wrist
+    own, given = study.wrist, study.wrist.model_fields_set
+    differ = {key: (getattr(theirs, key), getattr(own, key)) for key in type(own).model_fields if key in given}
+    each = [f"wrist.{key} is {there} there and {here} here" for key, (there, here) in differ.items() if there != here]
+    if each:
+        log.warning("the samples are of another wrist, which the network learns: %s", ", ".join(each))
 
 
 def recordings(samples: Samples | Transitions, settings: TrainSettings) -> NDArray[np.int64] | None:
