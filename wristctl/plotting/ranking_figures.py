@@ -27,6 +27,7 @@ from wristctl.plotting.style import (
     legend_under,
     line,
     logarithmic,
+    numbered,
     title,
 )
 
@@ -62,7 +63,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     axes.set_ylim(len(rankings) - 0.5, -0.5)
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0.0)
-    logarithmic(axes.xaxis)
+    numbered(axes.xaxis)
     wide = picture.get_figwidth() >= _ROOM
     axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval" if wide else "RMSE [deg], 95 % interval")
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
@@ -173,7 +174,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
             dots.append(Dot(height, 1.0 / inverse.value, shade, ends, scores[row] / scores[base], mark))
         draw_dots(panel, dots, size=3.5)
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
-        logarithmic(panel.xaxis, most=3)
+        numbered(panel.xaxis, most=3)
         panel.minorticks_off()
         title(panel, places[ranking.name])
     panels[0].set_yticks(range(len(labels)), [_called(label) for label in labels])

@@ -173,22 +173,27 @@ def undress(axes: Axes) -> None:
 class PowersOfTen(LogFormatterSciNotation):
     """Powers of ten such as 10⁻³ as plain text: to parse them as formulas takes longer than to draw all the rest."""
 
-    def __init__(self) -> None:
-        super().__init__(minor_thresholds=(math.inf, math.inf))  # every tick of its locator has a number
-
     def __call__(self, x: float, pos: int | None = None) -> str:
-        if 1e-3 <= x < 1e5 and not np.isclose(np.log10(x) % 1.0, (0.0, 1.0), atol=1e-9).any():
-            return f"{x:g}"
         formula: str = super().__call__(x, pos)
         plain = formula.replace(r"$\mathdefault{", "").replace(r"\times", "\u00d7").replace("}$", "").rstrip("}")
         base, _, power = plain.removesuffix("\u00d710^{0").partition("^{")
         return base + power.translate(_RAISED)
 
 
+def logarithmic(axis: Axis, steps: Sequence[float] = ()) -> None:
+    """Give an axis a logarithmic scale in powers of ten, or of plain numbers with these steps within a decade."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
+    if steps:
+        axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter("{x:g}" if steps else PowersOfTen())
+    axis.set_minor_formatter(NullFormatter() if steps else PowersOfTen())
+
+
 class Numbered(LogLocator):
     """Powers of ten; where fewer than two are in sight, 1, 2 and 5 times these, or round numbers of a narrow range."""
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """Places of ticks within a range, and beside it."""
         low, high = sorted((vmin, vmax))
         if low <= 0.0 or not math.isfinite(high):
             return super().tick_values(vmin, vmax)
@@ -204,14 +209,26 @@ def _within(places: Sequence[float], low: float, high: float) -> list[float]:
     return [place for place in places if low <= place <= high]
 
 
-def logarithmic(axis: Axis, steps: Sequence[float] = (), most: int | None = None) -> None:
-    """Give an axis a logarithmic scale in powers of ten, at most `most` of them, or of these steps within a decade.
+class Numbers(PowersOfTen):
+    """Powers of ten, and plain numbers between them."""
 
-    Without steps at least two of its ticks have numbers.
+    def __init__(self) -> None:
+        super().__init__(minor_thresholds=(math.inf, math.inf))  # every tick of its locator has a number
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        if 1e-3 <= x < 1e5 and not np.isclose(np.log10(x) % 1.0, (0.0, 1.0), atol=1e-9).any():
+            return f"{x:g}"
+        return super().__call__(x, pos)
+
+
+def numbered(axis: Axis, most: int | None = None) -> None:
+    """Give an axis a logarithmic scale of whose ticks two at least have numbers, however narrow its range is.
+
+    Of powers of ten it has at most `most`, and none of the small ticks between them has a number.
     """
-    axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
-    axis.set_major_locator(LogLocator(subs=steps) if steps else Numbered(numticks=most))
-    axis.set_major_formatter("{x:g}" if steps else PowersOfTen())
+    logarithmic(axis)
+    axis.set_major_locator(Numbered(numticks=most))
+    axis.set_major_formatter(Numbers())
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import NullFormatter
 
 from wristctl.arrays import Array
 from wristctl.commands.compare.csv_data import metrics_of
@@ -31,7 +30,6 @@ from wristctl.plotting.style import (
     PURPLE,
     TENDON_COLOURS,
     WIDTH,
-    Numbered,
     PowersOfTen,
     colour,
     columns_within,
@@ -122,8 +120,8 @@ def rmse_map(
         fig.set_figheight(fig.get_figheight() + _LETTER * max(map(len, names)))
     ours.set_xticks(range(len(columns)), names, rotation=turned)
     title(ours, heading)
-    bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [deg]", format=PowersOfTen(), ticks=Numbered())
-    bar.minorformatter = NullFormatter()
+    bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [deg]", format=PowersOfTen())
+    bar.minorformatter = PowersOfTen()
     bar.ax.tick_params(labelsize=9.0)
     return fig
 

@@ -28,6 +28,7 @@ from wristctl.plotting.style import (
     headed,
     legend_below,
     logarithmic,
+    numbered,
     title,
 )
 
@@ -81,7 +82,7 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
         draw_dots(panels[term_value.family], [dot], 3.0)
     for family, panel in panels.items():
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
-        logarithmic(panel.xaxis, most=3)
+        numbered(panel.xaxis, most=3)
         title(panel, _short(family))
     name_rows(every[0], terms)
     label = "times less RMSE, with 95 % interval; grey: cannot be told"
